@@ -1,0 +1,211 @@
+//! FIRE 2.0, the minimiser of both stages.
+//!
+//! J. Guénolé et al., Comput. Mater. Sci. 175, 109584 (2020), after E. Bitzek et al., Phys. Rev. Lett. 97, 170201
+//! (2006): damped dynamics that turns the velocity towards the force while the power `P = F·v` is positive, and stops
+//! and steps back half a move when it is not. Mass 1; semi-implicit Euler; the mixing comes before the move.
+
+use crate::domain::{Domain, Vec2};
+
+/// FIRE's parameters; the defaults are those of the paper.
+///
+/// # Example
+///
+/// ```
+/// use softjam::relax::fire::Fire;
+/// assert_eq!(Fire::default().delay, 20);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fire {
+    /// `N_delay`: moves with `P > 0` before the time step grows.
+    pub delay: u32,
+    /// `f_inc` > 1: growth of the time step.
+    pub increase: f64,
+    /// `f_dec`, between 0 and 1: its cut when `P ≤ 0`.
+    pub decrease: f64,
+    /// `α_start`, between 0 and 1: the mixing after a stop.
+    pub mixing: f64,
+    /// `f_α`, between 0 and 1: decay of the mixing.
+    pub mixing_decay: f64,
+    /// The time step starts at this fraction of `dt_max`, between 0 and 1.
+    pub first_dt: f64,
+    /// The time step is cut no further than this fraction of `dt_max`, between 0 and 1.
+    pub least_dt: f64,
+}
+
+impl Default for Fire {
+    fn default() -> Self {
+        Self {
+            delay: 20,
+            increase: 1.1,
+            decrease: 0.5,
+            mixing: 0.25,
+            mixing_decay: 0.99,
+            first_dt: 0.1,
+            least_dt: 0.002,
+        }
+    }
+}
+
+/// What FIRE carries from one move to the next.
+///
+/// # Example
+///
+/// ```
+/// use softjam::relax::fire::{Fire, FireState};
+///
+/// let state = FireState::start(&Fire::default(), 0.2);
+/// assert_eq!(FireState::from_values(&state.values()), Some(state));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FireState {
+    /// Time step (time).
+    pub dt: f64,
+    /// Upper bound of the time step (time), from the largest frequency at the start.
+    pub dt_max: f64,
+    /// Mixing of velocity and force, dimensionless.
+    pub alpha: f64,
+    /// Moves since `P` was last ≤ 0.
+    pub downhill: u32,
+    /// Moves made in all.
+    pub moves: u32,
+    /// Simulated time, the sum of the time steps (time).
+    pub time: f64,
+}
+
+impl FireState {
+    /// The state at the start of a relaxation with the given bound of the time step.
+    ///
+    /// ```
+    /// # use softjam::relax::fire::{Fire, FireState};
+    /// let state = FireState::start(&Fire::default(), 0.2);
+    /// assert_eq!((state.dt_max, state.alpha, state.time), (0.2, 0.25, 0.0));
+    /// ```
+    #[must_use]
+    pub fn start(fire: &Fire, dt_max: f64) -> Self {
+        Self {
+            dt: fire.first_dt * dt_max,
+            dt_max,
+            alpha: fire.mixing,
+            downhill: 0,
+            moves: 0,
+            time: 0.0,
+        }
+    }
+
+    /// The state as it is recorded: `dt`, `dt_max`, `alpha`, `downhill`, `moves`, `time`.
+    ///
+    /// ```
+    /// # use softjam::relax::fire::FireState;
+    /// assert_eq!(FireState::default().values(), [0.0; 6]);
+    /// ```
+    #[must_use]
+    pub fn values(&self) -> [f64; 6] {
+        [
+            self.dt,
+            self.dt_max,
+            self.alpha,
+            f64::from(self.downhill),
+            f64::from(self.moves),
+            self.time,
+        ]
+    }
+
+    /// The state from its recorded values; `None` if there are not six or a count is not a whole number.
+    ///
+    /// ```
+    /// # use softjam::relax::fire::FireState;
+    /// assert_eq!(FireState::from_values(&[0.1, 0.2, 0.25, 1.5, 3.0, 0.7]), None);
+    /// ```
+    #[must_use]
+    pub fn from_values(values: &[f64]) -> Option<Self> {
+        let &[dt, dt_max, alpha, downhill, moves, time] = values else {
+            return None;
+        };
+        let count = |x: f64| {
+            let n = x as u32; // saturates; the comparison catches whatever was not a count
+            (f64::from(n).to_bits() == x.to_bits()).then_some(n)
+        };
+        Some(Self {
+            dt,
+            dt_max,
+            alpha,
+            downhill: count(downhill)?,
+            moves: count(moves)?,
+            time,
+        })
+    }
+}
+
+impl Fire {
+    /// One move: changes state, velocities and positions; the positions end wrapped into `domain`.
+    ///
+    /// All slices have one entry a particle. Velocities start from zero.
+    ///
+    /// # Example
+    ///
+    /// A particle on a spring comes to rest:
+    ///
+    /// ```
+    /// use softjam::domain::{Domain, Vec2};
+    /// use softjam::relax::fire::{Fire, FireState};
+    ///
+    /// let (fire, domain) = (Fire::default(), Domain::new(10.0, 10.0).unwrap());
+    /// let (mut x, mut v) = (vec![Vec2::new(6.0, 4.0)], vec![Vec2::zeros()]);
+    /// let mut state = FireState::start(&fire, 0.5);
+    /// let home = Vec2::new(5.0, 5.0);
+    /// for _ in 0..300 {
+    ///     let force = [home - x[0]];
+    ///     fire.advance(&mut state, &force, &mut v, &mut x, domain);
+    /// }
+    /// assert!((x[0] - home).norm() < 1e-10);
+    /// ```
+    pub fn advance(
+        &self,
+        state: &mut FireState,
+        forces: &[Vec2],
+        velocities: &mut [Vec2],
+        positions: &mut [Vec2],
+        domain: Domain,
+    ) {
+        let power: f64 = forces.iter().zip(&*velocities).map(|(f, v)| f.dot(v)).sum();
+        let mut back = 0.0;
+        if power > 0.0 {
+            state.downhill = state.downhill.saturating_add(1);
+            if state.downhill > self.delay {
+                state.dt = (state.dt * self.increase).min(state.dt_max);
+                state.alpha *= self.mixing_decay;
+            }
+        } else {
+            state.downhill = 0;
+            // The first moves are given time to find their way.
+            if state.moves >= self.delay {
+                state.dt = (state.dt * self.decrease).max(self.least_dt * state.dt_max);
+                state.alpha = self.mixing;
+            }
+            back = -0.5 * state.dt;
+        }
+        let kept = if power > 0.0 { 1.0 } else { 0.0 };
+        let (mut vv, mut ff) = (0.0, 0.0);
+        for ((x, v), f) in positions.iter_mut().zip(&mut *velocities).zip(forces) {
+            if back != 0.0 {
+                *x += *v * back;
+            }
+            *v = *v * kept + f * state.dt;
+            vv += v.norm_squared();
+            ff += f.norm_squared();
+        }
+        let towards = if ff > 0.0 {
+            state.alpha * (vv / ff).sqrt()
+        } else {
+            0.0
+        };
+        let keep = 1.0 - state.alpha;
+        for ((x, v), f) in positions.iter_mut().zip(&mut *velocities).zip(forces) {
+            *v = *v * keep + f * towards;
+            *x = domain.wrap(*x + *v * state.dt);
+        }
+        state.moves = state.moves.saturating_add(1);
+        state.time += state.dt;
+    }
+}

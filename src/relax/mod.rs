@@ -1,0 +1,423 @@
+//! The relaxation: from undeformed disks to mechanical equilibrium, one frame after the other.
+//!
+//! The loop is that of Saitoh 2.2.5. Frame 0 is the packing of undeformed disks in balance, with the Morse–Witten
+//! forces solved on it; every move of [FIRE](fire) is followed by a new solution of the contact problem; the run ends at
+//! the first frame whose `f_max` is not above the threshold, or at the step limit.
+//!
+//! ```
+//! use softjam::{relax::{Relaxation, Status}, scene::Scene};
+//!
+//! let scene = Scene { particles: 64, phi: 0.9, ..Scene::default() };
+//! let mut run = Relaxation::new(&scene).unwrap();
+//! while run.status() == Status::Running {
+//!     run.advance().unwrap();
+//! }
+//! assert_eq!(run.status(), Status::Converged);
+//! assert!(run.f_max() <= scene.threshold);
+//! ```
+//!
+//! A frame carries everything that the next one depends on. Nothing else that the loop keeps (neighbour list, buffers)
+//! can reach a result; [`Relaxation::resume`] starts from any frame and walks the same bits.
+
+pub mod fire;
+pub mod frequency;
+
+use crate::contact::{ContactError, ContactLaw, Contacts};
+use crate::disks::{self, DiskReport};
+use crate::domain::Vec2;
+use crate::force::{Observables, largest_force, net_forces};
+use crate::frame::{Frame, FrameError};
+use crate::packing::Packing;
+use crate::scene::{Scene, SceneError, start};
+use fire::{Fire, FireState};
+
+/// How a relaxation stands.
+///
+/// ```
+/// assert_ne!(softjam::relax::Status::Running, softjam::relax::Status::Converged);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Above the threshold, below the step limit.
+    Running,
+    /// `f_max` is not above the threshold and the contact law is fulfilled.
+    Converged,
+    /// The step limit came first.
+    StepLimit,
+}
+
+/// Why a relaxation cannot go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RelaxError {
+    /// The scene makes no sense.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The contact problem at a step has no answer.
+    #[error("step {step}: {source}")]
+    Contact {
+        /// The step.
+        step: u64,
+        /// What went wrong.
+        source: ContactError,
+    },
+    /// A number left the range of numbers: the time step is too long for this scene.
+    #[error(
+        "step {step}: particle {particle} is not at a finite place; choose a smaller dt_max than {dt_max}"
+    )]
+    NotFinite {
+        /// The step.
+        step: u64,
+        /// The particle.
+        particle: usize,
+        /// The bound of the time step in use.
+        dt_max: f64,
+    },
+    /// The frame to go on from does not belong to the scene.
+    #[error("the frame does not belong to this scene: {0}")]
+    Frame(#[from] FrameError),
+}
+
+/// A packing on its way to mechanical equilibrium.
+///
+/// # Example
+///
+/// See the [module](self); as an iterator of frames:
+///
+/// ```
+/// use softjam::{relax::Relaxation, scene::Scene};
+///
+/// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+/// let frames: Result<Vec<_>, _> = Relaxation::new(&scene).unwrap().collect();
+/// let frames = frames.unwrap();
+/// assert_eq!(frames[0].step, 0);
+/// assert_eq!(frames.last().unwrap().step as usize, frames.len() - 1);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Relaxation {
+    packing: Packing,
+    velocities: Vec<Vec2>,
+    law: ContactLaw,
+    fire: Fire,
+    state: FireState,
+    step: u64,
+    threshold: f64,
+    step_limit: u64,
+    net: Vec<Vec2>,
+    f_max: f64,
+    disks: Option<DiskReport>,
+    yielded: bool,
+}
+
+impl Relaxation {
+    /// Frame 0 of a scene: its start, its disks relaxed, the contact problem solved.
+    ///
+    /// # Errors
+    ///
+    /// [`RelaxError::Scene`] for an invalid scene, [`RelaxError::Contact`] if the contact problem cannot be solved.
+    ///
+    /// ```
+    /// use softjam::{relax::Relaxation, scene::Scene};
+    ///
+    /// let error = Relaxation::new(&Scene { phi: -0.1, ..Scene::default() }).unwrap_err();
+    /// assert!(error.to_string().starts_with("phi = -0.1"));
+    /// ```
+    pub fn new(scene: &Scene) -> Result<Self, RelaxError> {
+        scene.validate()?;
+        let mut packing = start::packing(scene)?;
+        let disks = scene
+            .starts_from_disks()
+            .then(|| disks::relax(&mut packing, &scene.disks, scene.line_tension));
+        let mut law = scene.contact_law();
+        law.solve(&packing, &[], &[])
+            .map_err(|source| RelaxError::Contact { step: 0, source })?;
+        let dt_max = match scene.dt_max {
+            Some(dt_max) => dt_max,
+            None => {
+                let omega = frequency::largest_frequency(&packing, &mut law, 20)
+                    .map_err(|source| RelaxError::Contact { step: 0, source })?;
+                DT_MAX_PER_PERIOD / omega
+            }
+        };
+        let state = FireState::start(&scene.fire, dt_max);
+        let velocities = vec![Vec2::zeros(); packing.len()];
+        let mut run = Self {
+            net: vec![Vec2::zeros(); packing.len()],
+            packing,
+            velocities,
+            law,
+            fire: scene.fire,
+            state,
+            step: 0,
+            threshold: scene.threshold,
+            step_limit: scene.steps,
+            f_max: 0.0,
+            disks,
+            yielded: false,
+        };
+        run.balance();
+        Ok(run)
+    }
+
+    /// Goes on from a frame of an earlier run of `scene`, exactly as that run did.
+    ///
+    /// `packing` gives the radii and the box.
+    ///
+    /// # Errors
+    ///
+    /// [`RelaxError::Frame`] if the frame does not fit the packing, otherwise as [`new`](Self::new).
+    ///
+    /// ```
+    /// use softjam::{frame::Frame, relax::Relaxation, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// assert!(Relaxation::resume(&scene, run.packing().clone(), Frame::default()).is_err());
+    /// ```
+    pub fn resume(scene: &Scene, mut packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
+        scene.validate()?;
+        frame.validate(packing.len(), packing.domain())?;
+        *packing.positions_mut() = frame.positions;
+        let mut law = scene.contact_law();
+        law.restore(&packing, &frame.contacts, &frame.forces);
+        let mut run = Self {
+            net: vec![Vec2::zeros(); packing.len()],
+            packing,
+            velocities: frame.velocities,
+            law,
+            fire: scene.fire,
+            state: frame.minimizer,
+            step: frame.step,
+            threshold: scene.threshold,
+            step_limit: scene.steps,
+            f_max: 0.0,
+            disks: None,
+            yielded: false,
+        };
+        run.balance();
+        Ok(run)
+    }
+
+    /// One move and the contact problem after it.
+    ///
+    /// # Errors
+    ///
+    /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::NotFinite`] if the run blew up. The
+    /// run is then of no further use.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// let mut run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// run.advance().unwrap();
+    /// assert_eq!(run.step(), 1);
+    /// ```
+    pub fn advance(&mut self) -> Result<(), RelaxError> {
+        let domain = self.packing.domain();
+        self.fire.advance(
+            &mut self.state,
+            &self.net,
+            &mut self.velocities,
+            self.packing.positions_mut(),
+            domain,
+        );
+        self.step += 1;
+        let lost = |p: &Vec2| !(p.x.is_finite() && p.y.is_finite());
+        if let Some(particle) = self.velocities.iter().position(lost) {
+            return Err(RelaxError::NotFinite {
+                step: self.step,
+                particle,
+                dt_max: self.state.dt_max,
+            });
+        }
+        self.law
+            .solve_again(&self.packing)
+            .map_err(|source| RelaxError::Contact {
+                step: self.step,
+                source,
+            })?;
+        self.balance();
+        Ok(())
+    }
+
+    fn balance(&mut self) {
+        net_forces(&self.law.contacts(), &mut self.net);
+        self.f_max = largest_force(&self.net);
+    }
+
+    /// How the run stands at this frame.
+    ///
+    /// ```
+    /// # use softjam::{relax::{Relaxation, Status}, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, steps: 0, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.status(), Status::StepLimit);
+    /// ```
+    #[must_use]
+    pub fn status(&self) -> Status {
+        if self.f_max <= self.threshold && self.law.residual() <= self.law.accepted_residual() {
+            Status::Converged
+        } else if self.step >= self.step_limit {
+            Status::StepLimit
+        } else {
+            Status::Running
+        }
+    }
+
+    /// This frame, as a value of its own.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.frame().positions, run.packing().positions());
+    /// ```
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        let contacts = self.law.contacts();
+        Frame {
+            step: self.step,
+            positions: self.packing.positions().to_vec(),
+            velocities: self.velocities.clone(),
+            contacts: contacts.pairs.to_vec(),
+            forces: contacts.forces.to_vec(),
+            minimizer: self.state,
+        }
+    }
+
+    /// The packing as it stands.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.packing().len(), 32);
+    /// ```
+    #[must_use]
+    pub fn packing(&self) -> &Packing {
+        &self.packing
+    }
+
+    /// The contacts and forces at this frame.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.contacts().forces.iter().all(|f| *f > 0.0));
+    /// ```
+    #[must_use]
+    pub fn contacts(&self) -> Contacts<'_> {
+        self.law.contacts()
+    }
+
+    /// The net forces `F_i`, one a particle (γ).
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// let total: softjam::domain::Vec2 = run.net_forces().iter().sum();
+    /// assert!(total.norm() < 1e-14);
+    /// ```
+    #[must_use]
+    pub fn net_forces(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    /// Number of moves made.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.step(), 0);
+    /// ```
+    #[must_use]
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Simulated time, the sum of the time steps.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.time(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// The largest net force `f_max` (γ).
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.f_max(), run.observables().f_max);
+    /// ```
+    #[must_use]
+    pub fn f_max(&self) -> f64 {
+        self.f_max
+    }
+
+    /// Balance, energy, stress and coordination at this frame.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.observables().energy > 0.0);
+    /// ```
+    #[must_use]
+    pub fn observables(&self) -> Observables {
+        Observables::of(
+            &self.law.contacts(),
+            self.packing.domain(),
+            self.packing.len(),
+            self.f_max,
+            self.state.dt,
+        )
+    }
+
+    /// The contact law with its residual and its count of work.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.law().residual() <= run.law().accepted_residual());
+    /// ```
+    #[must_use]
+    pub fn law(&self) -> &ContactLaw {
+        &self.law
+    }
+
+    /// How the undeformed disks relaxed; `None` where there was no such stage (a start from a file, a resumed run).
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.disks().unwrap().converged);
+    /// ```
+    #[must_use]
+    pub fn disks(&self) -> Option<DiskReport> {
+        self.disks
+    }
+}
+
+/// Frames from the present one to the last, both included.
+impl Iterator for Relaxation {
+    type Item = Result<Frame, RelaxError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.yielded {
+            if self.status() != Status::Running {
+                return None;
+            }
+            if let Err(error) = self.advance() {
+                // The iterator ends behind the error.
+                self.step_limit = 0;
+                self.threshold = f64::INFINITY;
+                return Some(Err(error));
+            }
+        }
+        self.yielded = true;
+        Some(Ok(self.frame()))
+    }
+}
+
+/// `dt_max = DT_MAX_PER_PERIOD / ω_max`; 2 is the limit of stability.
+const DT_MAX_PER_PERIOD: f64 = 1.0;

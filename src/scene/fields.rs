@@ -1,0 +1,242 @@
+//! A scene with gaps: what a file or the flags say, before defaults are filled in.
+
+use super::{Channels, Minimizer, Radii, Scene, SceneError, Species, Start};
+use crate::contact::Rule;
+use crate::contact::solver::Method;
+use crate::disks::DiskParameters;
+use crate::droplet::contour::ContourStyle;
+use crate::relax::fire::Fire;
+
+/// The fields of a scene file, each of which may be missing. Whole numbers are signed here, so that a negative one is
+/// answered with the allowed range.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::SceneFields;
+///
+/// let file = SceneFields::from_toml("particles = 64\nphi = 0.9").unwrap();
+/// let flags = SceneFields { phi: Some(0.95), ..SceneFields::default() };
+/// let scene = file.overridden_by(flags).into_scene().unwrap();
+/// assert_eq!((scene.particles, scene.phi), (64, 0.95));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[expect(
+    missing_docs,
+    reason = "the fields are those of Scene, where they are documented"
+)]
+pub struct SceneFields {
+    pub particles: Option<i64>,
+    pub phi: Option<f64>,
+    pub aspect: Option<f64>,
+    pub species: Option<Vec<Species>>,
+    pub spread: Option<Spread>,
+    pub start: Option<String>,
+    pub file: Option<String>,
+    pub file_blake3: Option<String>,
+    pub seed: Option<u64>,
+    pub line_tension: Option<f64>,
+    pub threshold: Option<f64>,
+    pub steps: Option<i64>,
+    pub minimizer: Option<Minimizer>,
+    pub dt_max: Option<f64>,
+    pub contact_rule: Option<Rule>,
+    pub contact_solver: Option<Method>,
+    pub contact_tolerance: Option<f64>,
+    pub fire: Option<Fire>,
+    pub disks: Option<DiskParameters>,
+    pub contours: Option<ContourStyle>,
+    pub channels: Option<Channels>,
+}
+
+/// A continuous spread of radii as a scene file has it.
+///
+/// ```
+/// let spread = softjam::scene::SceneFields::from_toml("spread = { min = 0.4, max = 0.6 }").unwrap().spread;
+/// assert_eq!(spread.map(|s| s.max), Some(0.6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spread {
+    /// Smallest radius (length).
+    pub min: f64,
+    /// Largest radius (length).
+    pub max: f64,
+}
+
+impl SceneFields {
+    /// The fields that a TOML text names.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Toml`] for a field that does not exist or a value of the wrong kind.
+    ///
+    /// See the example of [`SceneFields`].
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        Ok(toml::from_str(text)?)
+    }
+
+    /// These fields, each replaced where `flags` has a value. Radii and start are replaced as a whole.
+    ///
+    /// See the example of [`SceneFields`].
+    #[must_use]
+    pub fn overridden_by(mut self, flags: Self) -> Self {
+        if flags.species.is_some() || flags.spread.is_some() {
+            self.species = None;
+            self.spread = None;
+        }
+        if flags.start.is_some() || flags.file.is_some() {
+            self.start = None;
+            self.file = None;
+            self.file_blake3 = None;
+        }
+        macro_rules! first_of {
+            ($($field:ident),*) => { Self { $($field: flags.$field.or(self.$field)),* } };
+        }
+        first_of!(
+            particles,
+            phi,
+            aspect,
+            species,
+            spread,
+            start,
+            file,
+            file_blake3,
+            seed,
+            line_tension,
+            threshold,
+            steps,
+            minimizer,
+            dt_max,
+            contact_rule,
+            contact_solver,
+            contact_tolerance,
+            fire,
+            disks,
+            contours,
+            channels
+        )
+    }
+
+    /// The scene, gaps filled with the defaults. Validated.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] names the field, its value and what is allowed.
+    ///
+    /// ```
+    /// use softjam::scene::{Scene, SceneFields};
+    /// assert_eq!(SceneFields::default().into_scene().unwrap(), Scene::default());
+    /// ```
+    pub fn into_scene(self) -> Result<Scene, SceneError> {
+        let start = self.start()?;
+        let radii = self.radii()?;
+        let default = Scene::default();
+        let scene = Scene {
+            particles: count("particles", self.particles, default.particles as u64, 1)? as usize,
+            phi: self.phi.unwrap_or(default.phi),
+            aspect: self.aspect.unwrap_or(default.aspect),
+            radii,
+            start,
+            seed: self.seed.unwrap_or(default.seed),
+            line_tension: self.line_tension.unwrap_or(default.line_tension),
+            threshold: self.threshold.unwrap_or(default.threshold),
+            steps: count("steps", self.steps, default.steps, 0)?,
+            minimizer: self.minimizer.unwrap_or_default(),
+            dt_max: self.dt_max,
+            contact_rule: self.contact_rule.unwrap_or_default(),
+            contact_solver: self.contact_solver.unwrap_or_default(),
+            contact_tolerance: self.contact_tolerance.unwrap_or(default.contact_tolerance),
+            fire: self.fire.unwrap_or_default(),
+            disks: self.disks.unwrap_or_default(),
+            contours: self.contours.unwrap_or(default.contours),
+            channels: self.channels.unwrap_or_default(),
+        };
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    fn start(&self) -> Result<Start, SceneError> {
+        let kind = match (&self.start, &self.file) {
+            (None, Some(_)) => "file",
+            (None, None) => "random",
+            (Some(kind), _) => kind.as_str(),
+        };
+        let conflict = |field: &str, value: String, why: &str| SceneError::Conflict {
+            field: field.into(),
+            value,
+            with: format!("start = \"{kind}\""),
+            why: why.into(),
+        };
+        match (kind, &self.file) {
+            ("random" | "hexagonal", Some(file)) => Err(conflict(
+                "file",
+                format!("\"{file}\""),
+                "only start = \"file\" reads a file",
+            )),
+            ("random", None) => Ok(Start::Random),
+            ("hexagonal", None) => Ok(Start::Hexagonal),
+            ("file", Some(path)) => {
+                let numbers = [
+                    ("particles", self.particles.map(|n| n.to_string())),
+                    ("phi", self.phi.map(|x| x.to_string())),
+                    ("aspect", self.aspect.map(|x| x.to_string())),
+                    ("seed", self.seed.map(|x| x.to_string())),
+                    ("species", self.species.as_ref().map(|_| "[…]".to_owned())),
+                    ("spread", self.spread.map(|_| "{…}".to_owned())),
+                ];
+                match numbers.into_iter().find_map(|(n, v)| v.map(|v| (n, v))) {
+                    Some((field, value)) => Err(conflict(
+                        field,
+                        value,
+                        "particles, radii and box come from the file",
+                    )),
+                    None => Ok(Start::File {
+                        path: path.clone(),
+                        blake3: self.file_blake3.clone(),
+                    }),
+                }
+            }
+            ("file", None) => Err(SceneError::Range {
+                field: "start".into(),
+                value: "\"file\"".into(),
+                allowed: "what can be done without file = \"PACKING.csv\"".into(),
+            }),
+            (other, _) => Err(SceneError::Range {
+                field: "start".into(),
+                value: format!("\"{other}\""),
+                allowed: "\"random\", \"hexagonal\" and \"file\"".into(),
+            }),
+        }
+    }
+
+    fn radii(&self) -> Result<Radii, SceneError> {
+        match (&self.species, self.spread) {
+            (Some(_), Some(_)) => Err(SceneError::Conflict {
+                field: "spread".into(),
+                value: "{…}".into(),
+                with: "species".into(),
+                why: "radii are either a mixture or a continuous spread".into(),
+            }),
+            (Some(species), None) => Ok(Radii::Species(species.clone())),
+            (None, Some(Spread { min, max })) => Ok(Radii::Spread { min, max }),
+            (None, None) => Ok(Radii::default()),
+        }
+    }
+}
+
+/// A whole number that may be missing; `least` is its lower bound.
+fn count(field: &str, value: Option<i64>, default: u64, least: u64) -> Result<u64, SceneError> {
+    match value {
+        None => Ok(default),
+        Some(n) => u64::try_from(n)
+            .ok()
+            .filter(|n| *n >= least)
+            .ok_or_else(|| SceneError::Range {
+                field: field.into(),
+                value: n.to_string(),
+                allowed: format!("{field} ≥ {least}"),
+            }),
+    }
+}

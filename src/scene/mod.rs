@@ -1,0 +1,335 @@
+//! The scene: everything that a run depends on, as a TOML file and as a value.
+//!
+//! A scene that names nothing is the default one. Every field has a default, a documented range and, on the command
+//! line, a flag of the same name that wins over the file. [`Scene::to_toml`] writes every field out with its comment;
+//! that text is what a recording carries.
+//!
+//! ```
+//! use softjam::scene::Scene;
+//!
+//! let scene = Scene::from_toml("particles = 1024\nphi = 0.9").unwrap();
+//! assert_eq!((scene.particles, scene.phi, scene.seed), (1024, 0.9, 1));
+//! assert_eq!(Scene::from_toml(&scene.to_toml()).unwrap(), scene);
+//!
+//! let error = Scene::from_toml("phi = 1.7").unwrap_err();
+//! assert_eq!(error.to_string(), "phi = 1.7 is outside 0 < phi < 1.3 (coverage of the undeformed disks)");
+//! ```
+
+mod fields;
+mod print;
+pub mod schedule;
+pub mod start;
+mod validate;
+
+pub use fields::SceneFields;
+pub use schedule::{Channels, Schedule};
+
+use crate::contact::solver::Method;
+use crate::contact::{ContactLaw, Rule};
+use crate::disks::DiskParameters;
+use crate::droplet::contour::{ContourStyle, Placement};
+use crate::relax::fire::Fire;
+
+/// One kind of particle in a mixture.
+///
+/// ```
+/// let small = softjam::scene::Species { radius: 0.5, fraction: 0.5 };
+/// assert_eq!(small.radius, 0.5);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Species {
+    /// Undeformed radius (length), positive.
+    pub radius: f64,
+    /// Share of the particles by number, between 0 and 1; the fractions of a mixture sum to 1.
+    pub fraction: f64,
+}
+
+/// How the undeformed radii are distributed.
+///
+/// ```
+/// use softjam::scene::Radii;
+/// assert!(matches!(Radii::default(), Radii::Species(mixture) if mixture.len() == 2));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum Radii {
+    /// A mixture. Particle numbers are rounded to the fractions, the largest remainders first; particles are numbered
+    /// species by species.
+    Species(Vec<Species>),
+    /// A continuous spread, uniform between two radii (length).
+    Spread {
+        /// Smallest radius.
+        min: f64,
+        /// Largest radius.
+        max: f64,
+    },
+}
+
+impl Default for Radii {
+    /// The 50:50 mixture of radii 0.5 and 0.7, whose packings do not crystallise.
+    fn default() -> Self {
+        Self::Species(vec![
+            Species {
+                radius: 0.5,
+                fraction: 0.5,
+            },
+            Species {
+                radius: 0.7,
+                fraction: 0.5,
+            },
+        ])
+    }
+}
+
+/// Where the centres come from.
+///
+/// ```
+/// assert_eq!(softjam::scene::Start::default(), softjam::scene::Start::Random);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// Uniformly random centres, then relaxed as undeformed disks.
+    #[default]
+    Random,
+    /// A hexagonal lattice that fits the box exactly, its aspect the nearest possible to the one asked for.
+    Hexagonal,
+    /// A CSV file; see [`start::read_csv`]. It brings radii and box with it, and its disks are not relaxed.
+    File {
+        /// Path of the file.
+        path: String,
+        /// BLAKE3 of the file in hexadecimal; if given, the file must match.
+        blake3: Option<String>,
+    },
+}
+
+/// Which minimiser relaxes the packing.
+///
+/// ```
+/// assert_eq!(softjam::scene::Minimizer::default(), softjam::scene::Minimizer::Fire);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Minimizer {
+    /// FIRE 2.0, see [`crate::relax::fire`].
+    #[default]
+    Fire,
+}
+
+/// Everything that a run depends on.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::{Radii, Scene, Species};
+///
+/// let scene = Scene {
+///     particles: 100,
+///     radii: Radii::Species(vec![Species { radius: 0.5, fraction: 1.0 }]),
+///     ..Scene::default()
+/// };
+/// scene.validate().unwrap();
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Number of particles `N`, 1…10 000 000. Default 256. Not used by a start from a file.
+    pub particles: usize,
+    /// Coverage `φ = Σ π R_i² / (L_x L_y)` of the *undeformed* disks, `0 < φ < 1.3`. Default 0.86. Not used by a start
+    /// from a file.
+    pub phi: f64,
+    /// Aspect `L_x / L_y` of the box, 0.1…10. Default 1. Not used by a start from a file.
+    pub aspect: f64,
+    /// Undeformed radii. Not used by a start from a file.
+    pub radii: Radii,
+    /// Where the centres come from. Default random.
+    pub start: Start,
+    /// Seed of the ChaCha8 generator behind random starts and continuous radii, any u64. Default 1.
+    pub seed: u64,
+    /// Line tension γ (force), positive. Default 1, which makes γ the unit of force.
+    pub line_tension: f64,
+    /// The run has converged when `f_max` (units of γ) is not above this; positive. Default 1e-10.
+    pub threshold: f64,
+    /// The run ends at this step in any case. Default 200 000.
+    pub steps: u64,
+    /// The minimiser.
+    pub minimizer: Minimizer,
+    /// Upper bound of the minimiser's time step (time, mass 1), positive. Default: from the largest frequency at the
+    /// start.
+    pub dt_max: Option<f64>,
+    /// How the contact list follows the positions.
+    pub contact_rule: Rule,
+    /// How `A f = δ` is solved.
+    pub contact_solver: Method,
+    /// Residual `max |A f − δ|` relative to the largest overlap to which it is solved, 1e-14…1e-6. Default 1e-12.
+    pub contact_tolerance: f64,
+    /// Parameters of FIRE.
+    pub fire: Fire,
+    /// The relaxation of the undeformed disks.
+    pub disks: DiskParameters,
+    /// How contours become polygons.
+    pub contours: ContourStyle,
+    /// What is recorded, and at which steps.
+    pub channels: Channels,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            particles: 256,
+            phi: 0.86,
+            aspect: 1.0,
+            radii: Radii::default(),
+            start: Start::default(),
+            seed: 1,
+            line_tension: 1.0,
+            threshold: 1e-10,
+            steps: 200_000,
+            minimizer: Minimizer::default(),
+            dt_max: None,
+            contact_rule: Rule::default(),
+            contact_solver: Method::default(),
+            contact_tolerance: 1e-12,
+            fire: Fire::default(),
+            disks: DiskParameters::default(),
+            contours: ContourStyle {
+                vertices: 32,
+                placement: Placement::Contacts,
+            },
+            channels: Channels::default(),
+        }
+    }
+}
+
+/// Why a scene makes no sense.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A field is out of its range.
+    #[error("{field} = {value} is outside {allowed}")]
+    Range {
+        /// The field, as it is called in the scene file.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What is allowed, and what the field means.
+        allowed: String,
+    },
+    /// Two fields contradict each other.
+    #[error("{field} = {value} cannot be given together with {with}: {why}")]
+    Conflict {
+        /// The field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// The other field.
+        with: String,
+        /// Why not.
+        why: String,
+    },
+    /// The text is not a scene: a misspelt field, a value of the wrong kind, broken TOML.
+    #[error("not a scene:\n{0}")]
+    Toml(#[from] toml::de::Error),
+    /// The box is too small for the minimum image.
+    #[error(
+        "particles = {particles} with phi = {phi} and aspect = {aspect} give a box of {length_x:.4} × {length_y:.4}, \
+         whose shorter side is less than 5 times the largest radius {largest_radius}: nearest images would be ambiguous; \
+         take more particles, a lower phi or an aspect nearer to 1"
+    )]
+    BoxTooSmall {
+        /// Number of particles.
+        particles: usize,
+        /// Coverage.
+        phi: f64,
+        /// Aspect.
+        aspect: f64,
+        /// Side `L_x`.
+        length_x: f64,
+        /// Side `L_y`.
+        length_y: f64,
+        /// Largest undeformed radius.
+        largest_radius: f64,
+    },
+    /// The scene would need more memory than there is.
+    #[error(
+        "particles = {particles} needs about {needed_mib} MiB of memory, of which {available_mib} MiB are available: take fewer particles"
+    )]
+    Memory {
+        /// Number of particles.
+        particles: usize,
+        /// Estimate of the memory needed, in MiB.
+        needed_mib: u64,
+        /// Memory available, in MiB.
+        available_mib: u64,
+    },
+    /// The start file is not a packing.
+    #[error("start file {path}, line {line}: {problem}")]
+    StartFile {
+        /// Path of the file.
+        path: String,
+        /// Line in the file, counted from 1; 0 for the file as a whole.
+        line: u64,
+        /// What is wrong and what is expected.
+        problem: String,
+    },
+    /// A file could not be read.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// Path of the file.
+        path: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}
+
+impl Scene {
+    /// The scene that a TOML text describes; what it does not name has its default. Validated.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] names the first field that is wrong, its value and what is allowed.
+    ///
+    /// ```
+    /// use softjam::scene::Scene;
+    ///
+    /// assert_eq!(Scene::from_toml("").unwrap(), Scene::default());
+    /// assert!(Scene::from_toml("coverage = 0.9").unwrap_err().to_string().contains("unknown field `coverage`"));
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        SceneFields::from_toml(text)?.into_scene()
+    }
+
+    /// Whether the centres are relaxed as undeformed disks first; a start from a file is taken as it is.
+    ///
+    /// ```
+    /// assert!(softjam::scene::Scene::default().starts_from_disks());
+    /// ```
+    #[must_use]
+    pub fn starts_from_disks(&self) -> bool {
+        !matches!(self.start, Start::File { .. })
+    }
+
+    /// The contact law that the scene asks for.
+    ///
+    /// ```
+    /// assert_eq!(softjam::scene::Scene::default().contact_law().line_tension(), 1.0);
+    /// ```
+    #[must_use]
+    pub fn contact_law(&self) -> ContactLaw {
+        ContactLaw::new(
+            self.contact_rule,
+            self.contact_solver,
+            self.line_tension,
+            self.contact_tolerance,
+        )
+    }
+
+    /// BLAKE3 of [`to_toml`](Self::to_toml): the identity of the scene.
+    ///
+    /// ```
+    /// use softjam::scene::Scene;
+    /// assert_ne!(Scene::default().digest(), Scene { seed: 2, ..Scene::default() }.digest());
+    /// ```
+    #[must_use]
+    pub fn digest(&self) -> [u8; 32] {
+        *blake3::hash(self.to_toml().as_bytes()).as_bytes()
+    }
+}

@@ -1,0 +1,176 @@
+//! The scene as a commented TOML text.
+
+use super::{Radii, Scene, Start};
+use core::fmt::Write as _;
+
+impl Scene {
+    /// The scene as TOML, every field written out with its meaning, range and unit; [`from_toml`](Self::from_toml)
+    /// gives it back exactly.
+    ///
+    /// ```
+    /// use softjam::scene::Scene;
+    ///
+    /// let text = Scene { seed: 7, ..Scene::default() }.to_toml();
+    /// assert!(text.lines().any(|line| line == "seed = 7"));
+    /// ```
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut page = Page::default();
+        page.text("# softjam scene. Lengths in diameters of the small particle, forces in units of the line tension, mass 1.");
+        self.write_packing(&mut page);
+        self.write_relaxation(&mut page);
+        self.write_recording(&mut page);
+        page.text
+    }
+
+    fn write_packing(&self, page: &mut Page) {
+        if let Start::File { path, blake3 } = &self.start {
+            page.field("Start: \"random\", \"hexagonal\" or \"file\".", "start", quoted("file"));
+            page.field(
+                "CSV file of x, y, radius with its box; particles, radii and box come from it.",
+                "file",
+                quoted(path),
+            );
+            if let Some(hash) = blake3 {
+                page.field("BLAKE3 that the file must have.", "file_blake3", quoted(hash));
+            }
+        } else {
+            page.field("Number of particles, 1 … 10000000.", "particles", self.particles);
+            page.field(
+                "Coverage of the undeformed disks, sum of pi R^2 / (L_x L_y), 0 < phi < 1.3.",
+                "phi",
+                number(self.phi),
+            );
+            page.field(
+                "Aspect L_x / L_y of the periodic box, 0.1 … 10 (hexagonal: the nearest that fits the lattice).",
+                "aspect",
+                number(self.aspect),
+            );
+            match &self.radii {
+                Radii::Species(species) => {
+                    let list: Vec<String> = species
+                        .iter()
+                        .map(|s| {
+                            format!(
+                                "{{ radius = {}, fraction = {} }}",
+                                number(s.radius),
+                                number(s.fraction)
+                            )
+                        })
+                        .collect();
+                    page.field(
+                        "Undeformed radii and their shares by number, which sum to 1; or: spread = { min = 0.4, max = 0.7 }.",
+                        "species",
+                        format!("[{}]", list.join(", ")),
+                    );
+                }
+                Radii::Spread { min, max } => page.field(
+                    "Undeformed radii, uniform between two values; or: species = [{ radius = 0.5, fraction = 1.0 }].",
+                    "spread",
+                    format!("{{ min = {}, max = {} }}", number(*min), number(*max)),
+                ),
+            }
+            let start = if self.start == Start::Hexagonal { "hexagonal" } else { "random" };
+            page.field(
+                "Start: \"random\", \"hexagonal\", or \"file\" with file = \"PACKING.csv\" (x, y, radius; \"# box = L_x, L_y\").",
+                "start",
+                quoted(start),
+            );
+            page.field(
+                "Seed of the ChaCha8 generator behind random centres and radii.",
+                "seed",
+                self.seed,
+            );
+        }
+        page.field("Line tension gamma of the contours, > 0.", "line_tension", number(self.line_tension));
+    }
+
+    fn write_relaxation(&self, page: &mut Page) {
+        page.field(
+            "Converged when the largest net force f_max (units of gamma) is not above this.",
+            "threshold",
+            number(self.threshold),
+        );
+        page.field("The run ends at this step in any case.", "steps", self.steps);
+        page.field("Minimiser: \"fire\".", "minimizer", value(&self.minimizer));
+        match self.dt_max {
+            Some(dt_max) => page.field("Upper bound of the time step.", "dt_max", number(dt_max)),
+            None => page.text(
+                "\n# Upper bound of the time step; without it, 1 / omega_max from the start's largest frequency.\n# dt_max = 0.2",
+            ),
+        }
+        page.field(
+            "Contact list: \"complementarity\" (f >= 0, gap >= 0, f gap = 0 in every step) or \"seed\" (one drop-and-add a step).",
+            "contact_rule",
+            value(&self.contact_rule),
+        );
+        page.field(
+            "Solver of A f = delta: \"conjugate-gradient\", \"sparse-cholesky\" or \"gauss-jordan\".",
+            "contact_solver",
+            value(&self.contact_solver),
+        );
+        page.field(
+            "Residual of A f = delta relative to the largest overlap, 1e-14 … 1e-6.",
+            "contact_tolerance",
+            number(self.contact_tolerance),
+        );
+        let fire = &self.fire;
+        page.text("\n# FIRE 2.0 (Guénolé et al., 2020): N_delay, f_inc, f_dec, alpha_start, f_alpha; the first and the least\n# time step as fractions of dt_max.\n[fire]");
+        page.line("delay", fire.delay);
+        page.line("increase", number(fire.increase));
+        page.line("decrease", number(fire.decrease));
+        page.line("mixing", number(fire.mixing));
+        page.line("mixing_decay", number(fire.mixing_decay));
+        page.line("first_dt", number(fire.first_dt));
+        page.line("least_dt", number(fire.least_dt));
+        page.text("\n# The undeformed disks that the run starts from: relaxed to this f_max, or for that many steps.\n[disks]");
+        page.line("threshold", number(self.disks.threshold));
+        page.line("steps", self.disks.steps);
+    }
+
+    fn write_recording(&self, page: &mut Page) {
+        page.text("\n# Polygons: vertices equally spaced in angle, 3 … 4096; placement \"contacts\" puts one more on each contact,\n# \"equal\" does not (and cuts the cusps off).\n[contours]");
+        page.line("vertices", self.contours.vertices);
+        page.line("placement", value(&self.contours.placement));
+        page.text("\n# When each channel is recorded: \"every K\" steps, \"log K\" steps a decade, or \"off\". The first and the last\n# frame are recorded in any case. Without state a recording cannot be replayed.\n[channels]");
+        for (name, schedule) in self.channels.named() {
+            page.line(name, quoted(&schedule.to_string()));
+        }
+    }
+}
+
+#[derive(Default)]
+struct Page {
+    text: String,
+}
+
+impl Page {
+    fn text(&mut self, text: &str) {
+        self.text.push_str(text);
+        self.text.push('\n');
+    }
+
+    fn line(&mut self, name: &str, value: impl core::fmt::Display) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.text, "{name} = {value}");
+    }
+
+    fn field(&mut self, comment: &str, name: &str, value: impl core::fmt::Display) {
+        let _ = writeln!(self.text, "\n# {comment}");
+        self.line(name, value);
+    }
+}
+
+/// The shortest text that reads back as the same f64.
+fn number(x: f64) -> String {
+    format!("{x:?}")
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.into()).to_string()
+}
+
+/// A unit variant in its name in the file.
+fn value<T: serde::Serialize>(variant: &T) -> String {
+    toml::Value::try_from(variant).map_or_else(|_| quoted(""), |v| v.to_string())
+}

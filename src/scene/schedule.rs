@@ -1,0 +1,161 @@
+//! What is recorded, and at which steps.
+
+use core::fmt;
+use core::str::FromStr;
+
+/// The steps at which a channel is recorded. The first and the last frame are recorded in any case, unless it is off.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::Schedule;
+///
+/// let schedule: Schedule = "every 10".parse().unwrap();
+/// assert!(schedule.includes(20) && !schedule.includes(21));
+/// let log: Schedule = "log 2".parse().unwrap();
+/// let steps: Vec<u64> = (0..200).filter(|s| log.includes(*s)).collect();
+/// assert_eq!(steps, [0, 1, 4, 10, 32, 100]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Schedule {
+    /// Never: neither recorded nor computed.
+    Off,
+    /// Every `k`-th step, `k` ≥ 1.
+    Every(u64),
+    /// About this many steps a decade, 1…1000, equally spaced in the logarithm.
+    Log(u32),
+}
+
+impl Schedule {
+    /// Whether `step` is one of the schedule's.
+    ///
+    /// ```
+    /// assert!(!softjam::scene::Schedule::Off.includes(0));
+    /// ```
+    #[must_use]
+    pub fn includes(self, step: u64) -> bool {
+        match self {
+            Self::Off => false,
+            Self::Every(k) => step.is_multiple_of(k.max(1)),
+            Self::Log(per_decade) => {
+                // A step is the first one behind a mark 10^(m/n). The small shift keeps whole powers of ten on
+                // their own side of rounding.
+                let mark =
+                    |s: u64| libm::floor(f64::from(per_decade) * libm::log10(s as f64) + 1e-9);
+                step <= 1 || mark(step) > mark(step - 1)
+            }
+        }
+    }
+
+    /// Whether anything is recorded at all.
+    ///
+    /// ```
+    /// assert!(softjam::scene::Schedule::Every(5).is_on());
+    /// ```
+    #[must_use]
+    pub fn is_on(self) -> bool {
+        self != Self::Off
+    }
+}
+
+impl fmt::Display for Schedule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => write!(f, "off"),
+            Self::Every(k) => write!(f, "every {k}"),
+            Self::Log(n) => write!(f, "log {n}"),
+        }
+    }
+}
+
+impl FromStr for Schedule {
+    type Err = String;
+
+    /// Reads `off`, `every K` or `log K`; a colon may stand for the space.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let allowed = || {
+            format!(
+                "`{text}` is not a schedule: write off, every K (K ≥ 1) or log K (K a decade, 1…1000)"
+            )
+        };
+        let mut words = text.split([' ', ':']).filter(|w| !w.is_empty());
+        let schedule = match (words.next(), words.next(), words.next()) {
+            (Some("off"), None, None) => Some(Self::Off),
+            (Some("every"), Some(k), None) => {
+                k.parse().ok().filter(|&k| k >= 1).map(Self::Every)
+            }
+            (Some("log"), Some(n), None) => n
+                .parse()
+                .ok()
+                .filter(|n| (1..=1000).contains(n))
+                .map(Self::Log),
+            _ => None,
+        };
+        schedule.ok_or_else(allowed)
+    }
+}
+
+impl serde::Serialize for Schedule {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for Schedule {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// A schedule for each of the four channels.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::{Channels, Schedule};
+///
+/// let channels = Channels::default();
+/// assert_eq!(channels.metrics, Schedule::Every(1));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Channels {
+    /// Particle polygons.
+    pub contours: Schedule,
+    /// The contact graph with its forces.
+    pub contacts: Schedule,
+    /// `f_max`, energy, pressure, coordination, contacts, rattlers, time step.
+    pub metrics: Schedule,
+    /// The lossless state, without which a recording can be looked at but not replayed.
+    pub state: Schedule,
+}
+
+impl Default for Channels {
+    fn default() -> Self {
+        Self {
+            contours: Schedule::Every(10),
+            contacts: Schedule::Every(10),
+            metrics: Schedule::Every(1),
+            state: Schedule::Every(10),
+        }
+    }
+}
+
+impl Channels {
+    /// Each channel with its name.
+    ///
+    /// ```
+    /// let names: Vec<_> = softjam::scene::Channels::default().named().iter().map(|c| c.0).collect();
+    /// assert_eq!(names, ["contours", "contacts", "metrics", "state"]);
+    /// ```
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, Schedule); 4] {
+        [
+            ("contours", self.contours),
+            ("contacts", self.contacts),
+            ("metrics", self.metrics),
+            ("state", self.state),
+        ]
+    }
+}

@@ -1,0 +1,326 @@
+//! The first packing of a scene: random, hexagonal or from a file.
+//!
+//! Random numbers come from the ChaCha8 generator (D. J. Bernstein), keyed with the seed in little-endian bytes followed
+//! by zeros; a number in `[0, 1)` is the upper 53 bits of one 64-bit word. That is part of what a seed means: the same
+//! seed gives the same start on every platform and in every version.
+
+use super::{Radii, Scene, SceneError, Species, Start};
+use crate::domain::{Domain, Vec2};
+use crate::packing::Packing;
+use core::f64::consts::PI;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// The packing that a scene starts from, its disks not yet relaxed.
+///
+/// # Errors
+///
+/// [`SceneError::BoxTooSmall`], or whatever is wrong with the start file.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::{start, Scene};
+///
+/// let packing = start::packing(&Scene { particles: 100, phi: 0.84, ..Scene::default() }).unwrap();
+/// assert_eq!(packing.len(), 100);
+/// assert!((packing.coverage() - 0.84).abs() < 1e-12);
+/// ```
+pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
+    let packing = match &scene.start {
+        Start::File { path, blake3 } => read_csv(path, blake3.as_deref())?,
+        Start::Random => {
+            let mut random = Random::new(scene.seed);
+            let radii = radii(scene, &mut random);
+            let domain = domain(scene, &radii, scene.aspect)?;
+            let l = domain.lengths();
+            let positions = (0..radii.len())
+                .map(|_| {
+                    let x = random.uniform();
+                    Vec2::new(x * l.x, random.uniform() * l.y)
+                })
+                .collect();
+            make(domain, radii, positions)?
+        }
+        Start::Hexagonal => {
+            let mut random = Random::new(scene.seed);
+            let mut radii = radii(scene, &mut random);
+            if radii.iter().any(|r| *r != radii[0]) {
+                random.shuffle(&mut radii);
+            }
+            let (columns, rows) = hexagonal_shape(radii.len(), scene.aspect);
+            let aspect = columns as f64 / (rows as f64 * 0.75_f64.sqrt());
+            let domain = domain(scene, &radii, aspect)?;
+            let l = domain.lengths();
+            let (dx, dy) = (l.x / columns as f64, l.y / rows as f64);
+            let positions = (0..radii.len())
+                .map(|p| {
+                    let (column, row) = (p % columns, p / columns);
+                    let shift = if row % 2 == 0 { 0.25 } else { 0.75 };
+                    Vec2::new((column as f64 + shift) * dx, (row as f64 + 0.5) * dy)
+                })
+                .collect();
+            make(domain, radii, positions)?
+        }
+    };
+    let (l, largest_radius) = (packing.domain().lengths(), packing.largest_radius());
+    if packing.domain().shortest() < 5.0 * largest_radius {
+        return Err(SceneError::BoxTooSmall {
+            particles: packing.len(),
+            phi: packing.coverage(),
+            aspect: l.x / l.y,
+            length_x: l.x,
+            length_y: l.y,
+            largest_radius,
+        });
+    }
+    Ok(packing)
+}
+
+fn make(domain: Domain, radii: Vec<f64>, positions: Vec<Vec2>) -> Result<Packing, SceneError> {
+    Packing::new(domain, radii, positions).map_err(|error| SceneError::Range {
+        field: "scene".into(),
+        value: error.to_string(),
+        allowed: "what a packing can be".into(),
+    })
+}
+
+fn domain(scene: &Scene, radii: &[f64], aspect: f64) -> Result<Domain, SceneError> {
+    let area = radii.iter().map(|r| PI * r * r).sum::<f64>() / scene.phi;
+    let length_x = (area * aspect).sqrt();
+    Domain::new(length_x, area / length_x).ok_or_else(|| SceneError::Range {
+        field: "phi".into(),
+        value: scene.phi.to_string(),
+        allowed: "what gives a box of finite size".into(),
+    })
+}
+
+/// Columns and (even) rows of a hexagonal lattice of `n` sites whose box has the aspect nearest to `aspect`.
+fn hexagonal_shape(n: usize, aspect: f64) -> (usize, usize) {
+    let distance = |rows: usize| {
+        let columns = (n / rows) as f64;
+        libm::log(columns / (rows as f64 * 0.75_f64.sqrt()) / aspect).abs()
+    };
+    let mut best = 2;
+    for rows in (2..=n).step_by(2).filter(|r| n.is_multiple_of(*r)) {
+        if distance(rows) < distance(best) {
+            best = rows;
+        }
+    }
+    (n / best, best)
+}
+
+fn radii(scene: &Scene, random: &mut Random) -> Vec<f64> {
+    match &scene.radii {
+        Radii::Spread { min, max } => (0..scene.particles)
+            .map(|_| min + (max - min) * random.uniform())
+            .collect(),
+        Radii::Species(species) => species
+            .iter()
+            .zip(numbers(species, scene.particles))
+            .flat_map(|(s, n)| core::iter::repeat_n(s.radius, n))
+            .collect(),
+    }
+}
+
+/// Whole numbers of particles that sum to `n`: the floor of each share, and one more for the largest remainders.
+fn numbers(species: &[Species], n: usize) -> Vec<usize> {
+    let share = |s: &Species| s.fraction * n as f64;
+    let mut numbers: Vec<usize> = species
+        .iter()
+        .map(|s| libm::floor(share(s)) as usize)
+        .collect();
+    let mut order: Vec<usize> = (0..species.len()).collect();
+    let remainder = |k: usize| share(&species[k]) - libm::floor(share(&species[k]));
+    order.sort_by(|&a, &b| remainder(b).total_cmp(&remainder(a)).then(a.cmp(&b)));
+    // Fractions sum to 1 within 1e-9, so at most one particle a species is missing, or a few too many in huge packings.
+    let mut missing = n as i64 - numbers.iter().sum::<usize>() as i64;
+    for &k in order.iter().cycle().take(2 * species.len() + 64) {
+        if missing > 0 {
+            numbers[k] += 1;
+            missing -= 1;
+        } else if missing < 0 && numbers[k] > 0 {
+            numbers[k] -= 1;
+            missing += 1;
+        }
+    }
+    numbers
+}
+
+struct Random(ChaCha8Rng);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        let mut key = [0; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        Self(ChaCha8Rng::from_seed(key))
+    }
+
+    /// A number in `[0, 1)`.
+    fn uniform(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// Fisher and Yates.
+    fn shuffle(&mut self, items: &mut [f64]) {
+        for k in (1..items.len()).rev() {
+            let other = (self.uniform() * (k + 1) as f64) as usize;
+            items.swap(k, other.min(k));
+        }
+    }
+}
+
+/// A packing from a CSV file.
+///
+/// The header is `x,y,radius`, one line a particle follows; a comment line `# box = L_x, L_y` gives the sides of the
+/// periodic box. Lengths in one unit of your choice (the default mixture uses the small diameter). With `blake3`, the
+/// file must have that BLAKE3 in hexadecimal.
+///
+/// ```text
+/// # box = 12.5, 12.5
+/// x,y,radius
+/// 0.31,7.25,0.5
+/// 1.40,7.01,0.7
+/// ```
+///
+/// # Errors
+///
+/// [`SceneError::Read`] if the file cannot be read, [`SceneError::StartFile`] names the line that is wrong.
+///
+/// # Example
+///
+/// ```
+/// use softjam::scene::start::read_csv;
+///
+/// let path = std::env::temp_dir().join("softjam-read-csv-example.csv");
+/// std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n2,1,0.7\n").unwrap();
+/// let packing = read_csv(path.to_str().unwrap(), None).unwrap();
+/// assert_eq!(packing.radii(), [0.5, 0.7]);
+/// # std::fs::remove_file(&path).unwrap();
+/// ```
+pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
+        path: path.into(),
+        source,
+    })?;
+    let wrong = |line: u64, problem: String| SceneError::StartFile {
+        path: path.into(),
+        line,
+        problem,
+    };
+    let found = blake3::hash(&bytes).to_hex();
+    if let Some(asked) = blake3
+        && !asked.eq_ignore_ascii_case(&found)
+    {
+        return Err(wrong(
+            0,
+            format!("its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"),
+        ));
+    }
+    let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
+    let domain = csv_box(text).map_err(|(line, problem)| wrong(line, problem))?;
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|e| wrong(1, e.to_string()))?;
+    if header != ["x", "y", "radius"].as_slice() {
+        let found: Vec<_> = header.iter().collect();
+        return Err(wrong(
+            1,
+            format!("the header is `{}`, not `x,y,radius`", found.join(",")),
+        ));
+    }
+    let (mut positions, mut radii) = (Vec::new(), Vec::new());
+    for record in reader.deserialize::<(f64, f64, f64)>() {
+        let (x, y, radius) = record.map_err(|e| {
+            let line = e.position().map_or(0, csv::Position::line);
+            wrong(line, format!("three numbers x,y,radius are expected: {e}"))
+        })?;
+        positions.push(Vec2::new(x, y));
+        radii.push(radius);
+    }
+    let packing =
+        Packing::new(domain, radii, positions).map_err(|error| wrong(0, error.to_string()))?;
+    let phi = packing.coverage();
+    if !(phi > 0.0 && phi < 1.3) {
+        return Err(wrong(
+            0,
+            format!("phi = {phi} is outside 0 < phi < 1.3 (coverage of the undeformed disks)"),
+        ));
+    }
+    Ok(packing)
+}
+
+/// The sides of the box from the comment `# box = L_x, L_y`.
+fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
+    for (number, line) in (1..).zip(text.lines()) {
+        let Some(comment) = line.trim().strip_prefix('#') else {
+            continue;
+        };
+        let Some((name, value)) = comment.split_once('=') else {
+            continue;
+        };
+        if name.trim() != "box" {
+            continue;
+        }
+        let sides: Vec<f64> = value
+            .split(',')
+            .filter_map(|side| side.trim().parse().ok())
+            .collect();
+        return match sides.as_slice() {
+            [x, y] => Domain::new(*x, *y),
+            _ => None,
+        }
+        .ok_or_else(|| {
+            let problem = format!("`{}` does not give two positive sides", line.trim());
+            (number, problem)
+        });
+    }
+    Err((0, "no comment `# box = L_x, L_y` gives the periodic box".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn generator_is_chacha8_of_the_seed() {
+        // The first block of ChaCha8 for an all-zero 256-bit key and IV (draft-strombergson-chacha-test-vectors, TC1).
+        let mut zero = Random::new(0);
+        assert_eq!(zero.0.next_u64().to_le_bytes(), [0x3e, 0x00, 0xef, 0x2f, 0x89, 0x5f, 0x40, 0xd6]);
+        assert_eq!(zero.0.next_u64().to_le_bytes(), [0x7f, 0x5b, 0xb8, 0xe8, 0x1f, 0x09, 0xa5, 0xa1]);
+    }
+
+    #[test]
+    fn particle_numbers_follow_the_fractions_and_sum_up() {
+        let species = |fractions: &[f64]| -> Vec<Species> {
+            let radius = 0.5;
+            fractions.iter().map(|&fraction| Species { radius, fraction }).collect()
+        };
+        assert_eq!(numbers(&species(&[0.5, 0.5]), 7), [4, 3]);
+        assert_eq!(numbers(&species(&[0.1, 0.2, 0.7]), 10), [1, 2, 7]);
+        assert_eq!(numbers(&species(&[1.0 / 3.0; 3]), 8).iter().sum::<usize>(), 8);
+    }
+
+    #[test]
+    fn hexagonal_start_is_the_perfect_lattice() {
+        let scene = Scene {
+            particles: 120,
+            phi: 0.92,
+            radii: Radii::Species(vec![Species { radius: 0.5, fraction: 1.0 }]),
+            start: Start::Hexagonal,
+            ..Scene::default()
+        };
+        let packing = packing(&scene).unwrap();
+        let spacing = (PI * 0.25 / 0.92 / 0.75_f64.sqrt()).sqrt();
+        for i in 0..120 {
+            let near = (0..120)
+                .filter(|&j| j != i)
+                .map(|j| packing.separation(i, j).norm())
+                .filter(|r| (r - spacing).abs() < 1e-12)
+                .count();
+            assert_eq!(near, 6);
+        }
+    }
+}
