@@ -73,7 +73,7 @@ pub struct Contacts<'a> {
 /// use softjam::scene::Scene;
 ///
 /// let relaxation = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-/// let contacts = FrameContacts::of(relaxation.packing(), relaxation.frame());
+/// let contacts = FrameContacts::of(relaxation.packing(), &relaxation.frame());
 /// assert_eq!(contacts.view().overlaps, relaxation.contacts().overlaps);
 /// ```
 #[derive(Clone, Debug, Default)]

@@ -26,7 +26,7 @@ use core::f64::consts::PI;
 /// ```
 pub const G_AT_CONTACT: f64 = -1.5;
 
-/// An upper bound of `g` over all angles: its maximum is 0.640 759… at ±74.78°.
+/// An upper bound of `g` over all angles: its maximum is 0.640 759… at ±74.77°.
 ///
 /// ```
 /// use softjam::droplet::kernel::{g, G_MAX};

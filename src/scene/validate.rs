@@ -7,13 +7,14 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`SceneError::Range`] or [`SceneError::BoxTooSmall`] for the first field that is wrong.
+    /// [`SceneError::Range`] for the first field that is wrong. Whether the box is large enough shows when the radii
+    /// are there, in [`start::packing`](super::start::packing).
     ///
     /// ```
     /// use softjam::scene::Scene;
     ///
-    /// let error = Scene { particles: 4, ..Scene::default() }.validate().unwrap_err();
-    /// assert!(error.to_string().contains("less than 5 times the largest radius"));
+    /// let error = Scene { aspect: f64::NAN, ..Scene::default() }.validate().unwrap_err();
+    /// assert_eq!(error.to_string(), "aspect = NaN is outside 0.1 ≤ aspect ≤ 10 (L_x / L_y)");
     /// ```
     pub fn validate(&self) -> Result<(), SceneError> {
         positive("line_tension", self.line_tension)?;
@@ -134,8 +135,6 @@ impl Scene {
                 "the even numbers that start = \"hexagonal\" needs to close its rows across the box edge",
             );
         }
-        // The box needs the radii; the largest of them and the mean square are known beforehand but for rounding to
-        // whole particles, so the exact test is made where the packing is.
         Ok(())
     }
 
