@@ -89,7 +89,11 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
                 steps: step,
                 f_max,
                 converged,
-                coordination: if held == 0 { 0.0 } else { 2.0 * contacts as f64 / held as f64 },
+                coordination: if held == 0 {
+                    0.0
+                } else {
+                    2.0 * contacts as f64 / held as f64
+                },
                 rattlers,
             };
         }

@@ -146,7 +146,10 @@ impl Observables {
             *s /= domain.area();
         }
         let touching = contacts.pairs.iter().zip(contacts.forces);
-        let touching: Vec<[u32; 2]> = touching.filter(|(_, f)| **f > 0.0).map(|(p, _)| *p).collect();
+        let touching: Vec<[u32; 2]> = touching
+            .filter(|(_, f)| **f > 0.0)
+            .map(|(p, _)| *p)
+            .collect();
         (o.rattlers, o.backbone_contacts) = backbone(particles, &touching);
         o
     }

@@ -102,7 +102,9 @@ impl Frame {
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = blake3::Hasher::new();
         let mut buffer = Vec::with_capacity(
-            64 + 32 * self.positions.len() + 16 * self.contacts.len() + 8 * self.minimizer.values().len(),
+            64 + 32 * self.positions.len()
+                + 16 * self.contacts.len()
+                + 8 * self.minimizer.values().len(),
         );
         let count = |n: usize| (n as u64).to_le_bytes();
         buffer.extend_from_slice(&self.step.to_le_bytes());

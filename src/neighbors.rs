@@ -84,7 +84,8 @@ impl NeighborList {
         self.reach = margin + skin;
         self.reference.clear();
         self.reference.extend_from_slice(packing.positions());
-        self.cells.pairs_within(packing, self.reach, &mut self.pairs);
+        self.cells
+            .pairs_within(packing, self.reach, &mut self.pairs);
         self.builds += 1;
         true
     }
@@ -150,8 +151,7 @@ impl CellList {
         self.first.clear();
         self.first.resize(grid.columns * grid.rows + 1, 0);
         self.cell_of.clear();
-        self.cell_of
-            .extend(positions.iter().map(|&p| grid.cell(p)));
+        self.cell_of.extend(positions.iter().map(|&p| grid.cell(p)));
         for &c in &self.cell_of {
             self.first[c as usize + 1] += 1;
         }

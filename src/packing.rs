@@ -213,8 +213,13 @@ impl Packing {
     /// ```
     #[must_use]
     pub fn coverage(&self) -> f64 {
-        self.radii.iter().map(|r| PI * r * r).sum::<f64>() / self.domain.area()
+        coverage(&self.radii, self.domain)
     }
+}
+
+/// `φ = Σ π R_i² / (L_x L_y)`.
+pub(crate) fn coverage(radii: &[f64], domain: Domain) -> f64 {
+    radii.iter().map(|r| PI * r * r).sum::<f64>() / domain.area()
 }
 
 /// The unit vector and the length of a separation; coincident centres are told apart along x, by definition.

@@ -64,7 +64,9 @@ pub enum ContactError {
         shortest: f64,
     },
     /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
-    #[error("the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps")]
+    #[error(
+        "the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps"
+    )]
     Unsettled {
         /// Pairs that still break the law.
         offending: usize,
@@ -513,11 +515,7 @@ impl ContactLaw {
 
     /// Exchanges the first `count` offending pairs between the two sides.
     fn exchange(&mut self, count: usize) {
-        debug_assert!(
-            self.offending
-                .windows(2)
-                .all(|w| w[0].pair() < w[1].pair())
-        );
+        debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
         let (pairs, forces) = &mut self.next;
         pairs.clear();
         forces.clear();

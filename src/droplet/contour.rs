@@ -233,6 +233,17 @@ impl Contours {
         &self.vertices[self.first[p]..self.first[p + 1]]
     }
 
+    /// Number of vertices of all polygons.
+    ///
+    /// ```
+    /// use softjam::droplet::contour::{ContourStyle, Contours};
+    /// assert_eq!(Contours::new(ContourStyle::default()).vertices(), 0);
+    /// ```
+    #[must_use]
+    pub fn vertices(&self) -> usize {
+        self.vertices.len()
+    }
+
     /// How often the kernel was evaluated so far: a count of work.
     ///
     /// ```
@@ -266,7 +277,12 @@ mod tests {
             forces: &vec![force; n],
         };
         let mut contours = Contours::new(style);
-        contours.draw(&vec![0.5; n + 1], &vec![Vec2::zeros(); n + 1], &contacts, 2.0);
+        contours.draw(
+            &vec![0.5; n + 1],
+            &vec![Vec2::zeros(); n + 1],
+            &contacts,
+            2.0,
+        );
         contours.polygon(0).to_vec()
     }
 
@@ -281,12 +297,16 @@ mod tests {
             let polygon = squeezed(style, &angles, 0.3);
             assert_eq!(
                 polygon.len(),
-                if placement == Placement::Equal { 40 } else { 43 }
+                if placement == Placement::Equal {
+                    40
+                } else {
+                    43
+                }
             );
             for v in &polygon {
                 let theta = libm::atan2(v.y, v.x);
-                let rho: f64 = 0.5
-                    + 0.5 / (4.0 * PI) * angles.iter().map(|a| 0.3 * g(theta - a)).sum::<f64>();
+                let rho: f64 =
+                    0.5 + 0.5 / (4.0 * PI) * angles.iter().map(|a| 0.3 * g(theta - a)).sum::<f64>();
                 assert!((v.norm() - rho).abs() < 1e-14);
             }
         }

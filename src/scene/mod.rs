@@ -297,6 +297,31 @@ impl Scene {
         SceneFields::from_toml(text)?.into_scene()
     }
 
+    /// The scene with the BLAKE3 of its start file filled in, so that it names its content and not only its path.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Read`] if the start file cannot be read.
+    ///
+    /// ```
+    /// use softjam::scene::Scene;
+    /// assert_eq!(Scene::default().pinned().unwrap(), Scene::default());
+    /// ```
+    pub fn pinned(mut self) -> Result<Self, SceneError> {
+        if let Start::File {
+            path,
+            blake3: hash @ None,
+        } = &mut self.start
+        {
+            let bytes = std::fs::read(&*path).map_err(|source| SceneError::Read {
+                path: path.clone(),
+                source,
+            })?;
+            *hash = Some(blake3::hash(&bytes).to_hex().to_string());
+        }
+        Ok(self)
+    }
+
     /// Whether the centres are relaxed as undeformed disks first; a start from a file is taken as it is.
     ///
     /// ```

@@ -25,17 +25,29 @@ impl Scene {
 
     fn write_packing(&self, page: &mut Page) {
         if let Start::File { path, blake3 } = &self.start {
-            page.field("Start: \"random\", \"hexagonal\" or \"file\".", "start", quoted("file"));
+            page.field(
+                "Start: \"random\", \"hexagonal\" or \"file\".",
+                "start",
+                quoted("file"),
+            );
             page.field(
                 "CSV file of x, y, radius with its box; particles, radii and box come from it.",
                 "file",
                 quoted(path),
             );
             if let Some(hash) = blake3 {
-                page.field("BLAKE3 that the file must have.", "file_blake3", quoted(hash));
+                page.field(
+                    "BLAKE3 that the file must have.",
+                    "file_blake3",
+                    quoted(hash),
+                );
             }
         } else {
-            page.field("Number of particles, 1 … 10000000.", "particles", self.particles);
+            page.field(
+                "Number of particles, 1 … 10000000.",
+                "particles",
+                self.particles,
+            );
             page.field(
                 "Coverage of the undeformed disks, sum of pi R^2 / (L_x L_y), 0 < phi < 1.3.",
                 "phi",
@@ -70,7 +82,11 @@ impl Scene {
                     format!("{{ min = {}, max = {} }}", number(*min), number(*max)),
                 ),
             }
-            let start = if self.start == Start::Hexagonal { "hexagonal" } else { "random" };
+            let start = if self.start == Start::Hexagonal {
+                "hexagonal"
+            } else {
+                "random"
+            };
             page.field(
                 "Start: \"random\", \"hexagonal\", or \"file\" with file = \"PACKING.csv\" (x, y, radius; \"# box = L_x, L_y\").",
                 "start",
@@ -82,7 +98,11 @@ impl Scene {
                 self.seed,
             );
         }
-        page.field("Line tension gamma of the contours, > 0.", "line_tension", number(self.line_tension));
+        page.field(
+            "Line tension gamma of the contours, > 0.",
+            "line_tension",
+            number(self.line_tension),
+        );
     }
 
     fn write_relaxation(&self, page: &mut Page) {
@@ -91,7 +111,11 @@ impl Scene {
             "threshold",
             number(self.threshold),
         );
-        page.field("The run ends at this step in any case.", "steps", self.steps);
+        page.field(
+            "The run ends at this step in any case.",
+            "steps",
+            self.steps,
+        );
         page.field("Minimiser: \"fire\".", "minimizer", value(&self.minimizer));
         match self.dt_max {
             Some(dt_max) => page.field("Upper bound of the time step.", "dt_max", number(dt_max)),

@@ -81,9 +81,7 @@ impl FromStr for Schedule {
         let mut words = text.split([' ', ':']).filter(|w| !w.is_empty());
         let schedule = match (words.next(), words.next(), words.next()) {
             (Some("off"), None, None) => Some(Self::Off),
-            (Some("every"), Some(k), None) => {
-                k.parse().ok().filter(|&k| k >= 1).map(Self::Every)
-            }
+            (Some("every"), Some(k), None) => k.parse().ok().filter(|&k| k >= 1).map(Self::Every),
             (Some("log"), Some(n), None) => n
                 .parse()
                 .ok()

@@ -214,7 +214,9 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
     {
         return Err(wrong(
             0,
-            format!("its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"),
+            format!(
+                "its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"
+            ),
         ));
     }
     let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
@@ -277,7 +279,10 @@ fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
             (number, problem)
         });
     }
-    Err((0, "no comment `# box = L_x, L_y` gives the periodic box".into()))
+    Err((
+        0,
+        "no comment `# box = L_x, L_y` gives the periodic box".into(),
+    ))
 }
 
 #[cfg(test)]
@@ -288,19 +293,31 @@ mod tests {
     fn generator_is_chacha8_of_the_seed() {
         // The first block of ChaCha8 for an all-zero 256-bit key and IV (draft-strombergson-chacha-test-vectors, TC1).
         let mut zero = Random::new(0);
-        assert_eq!(zero.0.next_u64().to_le_bytes(), [0x3e, 0x00, 0xef, 0x2f, 0x89, 0x5f, 0x40, 0xd6]);
-        assert_eq!(zero.0.next_u64().to_le_bytes(), [0x7f, 0x5b, 0xb8, 0xe8, 0x1f, 0x09, 0xa5, 0xa1]);
+        assert_eq!(
+            zero.0.next_u64().to_le_bytes(),
+            [0x3e, 0x00, 0xef, 0x2f, 0x89, 0x5f, 0x40, 0xd6]
+        );
+        assert_eq!(
+            zero.0.next_u64().to_le_bytes(),
+            [0x7f, 0x5b, 0xb8, 0xe8, 0x1f, 0x09, 0xa5, 0xa1]
+        );
     }
 
     #[test]
     fn particle_numbers_follow_the_fractions_and_sum_up() {
         let species = |fractions: &[f64]| -> Vec<Species> {
             let radius = 0.5;
-            fractions.iter().map(|&fraction| Species { radius, fraction }).collect()
+            fractions
+                .iter()
+                .map(|&fraction| Species { radius, fraction })
+                .collect()
         };
         assert_eq!(numbers(&species(&[0.5, 0.5]), 7), [4, 3]);
         assert_eq!(numbers(&species(&[0.1, 0.2, 0.7]), 10), [1, 2, 7]);
-        assert_eq!(numbers(&species(&[1.0 / 3.0; 3]), 8).iter().sum::<usize>(), 8);
+        assert_eq!(
+            numbers(&species(&[1.0 / 3.0; 3]), 8).iter().sum::<usize>(),
+            8
+        );
     }
 
     #[test]
@@ -308,7 +325,10 @@ mod tests {
         let scene = Scene {
             particles: 120,
             phi: 0.92,
-            radii: Radii::Species(vec![Species { radius: 0.5, fraction: 1.0 }]),
+            radii: Radii::Species(vec![Species {
+                radius: 0.5,
+                fraction: 1.0,
+            }]),
             start: Start::Hexagonal,
             ..Scene::default()
         };

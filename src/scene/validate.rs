@@ -57,7 +57,12 @@ impl Scene {
             open(f.decrease),
             "0 < decrease < 1",
         )?;
-        within("fire.mixing", f.mixing, half_open(f.mixing), "0 < mixing ≤ 1")?;
+        within(
+            "fire.mixing",
+            f.mixing,
+            half_open(f.mixing),
+            "0 < mixing ≤ 1",
+        )?;
         within(
             "fire.mixing_decay",
             f.mixing_decay,

@@ -1,3 +1,5 @@
 //! Integration tests, one module a theme.
 
+mod common;
 mod physics;
+mod scenes;

@@ -64,8 +64,7 @@ impl SparseCholesky {
             contacts: n,
         };
         self.lower_triangle(matrix);
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(n, n, &self.pointers, None, &self.rows);
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.pointers, None, &self.rows);
         let known = self
             .symbolic
             .take()

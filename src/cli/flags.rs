@@ -1,0 +1,194 @@
+//! The flags that describe a scene. Each has a field of the same name in the scene file, over which it wins.
+
+use anyhow::Context as _;
+use clap::Args;
+use softjam::scene::{Channels, Scene, SceneError, SceneFields, Schedule};
+use std::path::PathBuf;
+
+#[derive(Args)]
+pub struct SceneFlags {
+    /// Scene file (TOML); see `softjam scene`. Without it, the default scene.
+    #[arg(value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+
+    /// Number of particles N.
+    #[arg(long, short = 'N', value_name = "N", allow_negative_numbers = true, help_heading = PACKING)]
+    particles: Option<i64>,
+
+    /// Coverage φ of the undeformed disks, 0 < φ < 1.3.
+    #[arg(long, value_name = "PHI", allow_negative_numbers = true, help_heading = PACKING)]
+    phi: Option<f64>,
+
+    /// Aspect L_x / L_y of the periodic box.
+    #[arg(long, value_name = "RATIO", allow_negative_numbers = true, help_heading = PACKING)]
+    aspect: Option<f64>,
+
+    /// Seed of the random start.
+    #[arg(long, short = 's', value_name = "SEED", help_heading = PACKING)]
+    seed: Option<u64>,
+
+    /// Where the centres come from: random, hexagonal or file.
+    #[arg(long, value_name = "START", help_heading = PACKING)]
+    start: Option<String>,
+
+    /// Start from a CSV file of x, y, radius with a comment `# box = L_x, L_y`.
+    #[arg(long, value_name = "PACKING.csv", help_heading = PACKING)]
+    file: Option<String>,
+
+    /// Line tension γ of the contours.
+    #[arg(long, value_name = "GAMMA", allow_negative_numbers = true, help_heading = PACKING)]
+    line_tension: Option<f64>,
+
+    /// Converged when the largest net force f_max (units of γ) is not above this.
+    #[arg(long, value_name = "F_MAX", allow_negative_numbers = true, help_heading = RELAXATION)]
+    threshold: Option<f64>,
+
+    /// End at this step in any case.
+    #[arg(long, value_name = "STEPS", allow_negative_numbers = true, help_heading = RELAXATION)]
+    steps: Option<i64>,
+
+    /// Upper bound of the time step; by default from the largest frequency.
+    #[arg(long, value_name = "DT", allow_negative_numbers = true, help_heading = RELAXATION)]
+    dt_max: Option<f64>,
+
+    /// How the contact list follows the positions: complementarity or seed.
+    #[arg(long, value_name = "RULE", value_parser = named::<softjam::contact::Rule>, help_heading = RELAXATION)]
+    contact_rule: Option<softjam::contact::Rule>,
+
+    /// How A f = δ is solved: conjugate-gradient, sparse-cholesky or gauss-jordan.
+    #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::contact::solver::Method>, help_heading = RELAXATION)]
+    contact_solver: Option<softjam::contact::solver::Method>,
+
+    /// What to record: a list of contours, contacts, metrics, state, each as it is scheduled in the scene or with a
+    /// schedule of its own, as in `metrics,state=every:10,contours=log:20`; what is not named is off.
+    #[arg(long, value_name = "LIST", value_parser = channel_list, help_heading = RECORDING)]
+    channels: Option<ChannelList>,
+
+    /// Record contours, contacts and state at every K-th step (metrics are small and keep their schedule).
+    #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = RECORDING)]
+    every: Option<i64>,
+
+    /// Vertices of a contour, beside those on the contacts.
+    #[arg(long, value_name = "N", help_heading = RECORDING)]
+    vertices: Option<usize>,
+}
+
+const PACKING: &str = "Packing";
+const RELAXATION: &str = "Relaxation";
+pub const RECORDING: &str = "Recording";
+
+/// The channels of `--channels`, with a schedule where one is given.
+type ChannelList = Vec<(usize, Option<Schedule>)>;
+
+impl SceneFlags {
+    /// The scene: defaults, overridden by the file, overridden by the flags.
+    pub fn scene(&self) -> anyhow::Result<Scene> {
+        let file = match &self.scene {
+            None => SceneFields::default(),
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+                    path: path.display().to_string(),
+                    source,
+                })?;
+                SceneFields::from_toml(&text)
+                    .with_context(|| format!("scene file {}", path.display()))?
+            }
+        };
+        let channels = self.channels(file.channels.unwrap_or_default())?;
+        let contours = self.vertices.map(|vertices| {
+            let mut style = file.contours.unwrap_or_default();
+            style.vertices = vertices;
+            style
+        });
+        let flags = SceneFields {
+            particles: self.particles,
+            phi: self.phi,
+            aspect: self.aspect,
+            seed: self.seed,
+            start: self.start.clone(),
+            file: self.file.clone(),
+            line_tension: self.line_tension,
+            threshold: self.threshold,
+            steps: self.steps,
+            dt_max: self.dt_max,
+            contact_rule: self.contact_rule,
+            contact_solver: self.contact_solver,
+            contours,
+            channels,
+            ..SceneFields::default()
+        };
+        Ok(file.overridden_by(flags).into_scene()?)
+    }
+
+    fn channels(&self, scheduled: Channels) -> Result<Option<Channels>, SceneError> {
+        let mut channels = scheduled;
+        if let Some(list) = &self.channels {
+            channels = Channels {
+                contours: Schedule::Off,
+                contacts: Schedule::Off,
+                metrics: Schedule::Off,
+                state: Schedule::Off,
+            };
+            for &(k, schedule) in list {
+                // A channel that the scene switches off and the flag names goes by its default.
+                let in_scene = scheduled.named()[k].1;
+                let default = Channels::default().named()[k].1;
+                let usual = if in_scene.is_on() { in_scene } else { default };
+                *channel(&mut channels, k) = schedule.unwrap_or(usual);
+            }
+        }
+        if let Some(k) = self.every {
+            let every = u64::try_from(k).ok().filter(|k| *k >= 1);
+            let every = every.ok_or_else(|| SceneError::Range {
+                field: "every".to_owned(),
+                value: k.to_string(),
+                allowed: "every ≥ 1 (steps)".to_owned(),
+            })?;
+            for place in [
+                &mut channels.contours,
+                &mut channels.contacts,
+                &mut channels.state,
+            ] {
+                if place.is_on() {
+                    *place = Schedule::Every(every);
+                }
+            }
+        }
+        Ok((self.channels.is_some() || self.every.is_some()).then_some(channels))
+    }
+}
+
+fn channel(channels: &mut Channels, k: usize) -> &mut Schedule {
+    match k {
+        0 => &mut channels.contours,
+        1 => &mut channels.contacts,
+        2 => &mut channels.metrics,
+        _ => &mut channels.state,
+    }
+}
+
+/// A unit variant by its name in the scene file.
+fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(text);
+    T::deserialize(value).map_err(|e| e.to_string())
+}
+
+fn channel_list(text: &str) -> Result<ChannelList, String> {
+    let names = Channels::default().named().map(|(name, _)| name);
+    text.split(',')
+        .map(|word| {
+            let (name, schedule) = match word.trim().split_once('=') {
+                Some((name, schedule)) => (name.trim(), Some(schedule.parse()?)),
+                None => (word.trim(), None),
+            };
+            let place = names.iter().position(|n| *n == name);
+            let place = place.ok_or_else(|| {
+                format!(
+                    "`{name}` is not a channel; the channels are {}",
+                    names.join(", ")
+                )
+            })?;
+            Ok((place, schedule))
+        })
+        .collect()
+}

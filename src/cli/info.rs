@@ -1,0 +1,171 @@
+//! `softjam info`: says what a recording holds.
+
+use super::{Verdict, print};
+use softjam::record::Outcome;
+use softjam::replay::{Event, ReadError, Recording};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  softjam info run.rrd
+  softjam info run.rrd --json | jq .f_max")]
+pub struct Arguments {
+    /// The recording.
+    #[arg(value_name = "RUN.rrd")]
+    file: PathBuf,
+
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a pass over the file finds.
+#[derive(Default)]
+struct Findings {
+    /// Recorded steps of each channel: how many, the first and the last.
+    channels: BTreeMap<String, (u64, u64, u64)>,
+    /// The last value of each metric.
+    metrics: BTreeMap<String, f64>,
+    result: Option<Outcome>,
+    damage: Option<ReadError>,
+}
+
+impl Findings {
+    fn of(recording: &mut Recording) -> Self {
+        let mut found = Self::default();
+        for event in recording {
+            let (channel, step) = match event {
+                Ok(Event::State(frame)) => ("state", frame.step),
+                Ok(Event::Drawn { channel, step }) => (channel, step),
+                Ok(Event::Metric { name, step, value }) => {
+                    let first_seen = name == "f_max";
+                    found.metrics.insert(name, value);
+                    if !first_seen {
+                        continue;
+                    }
+                    ("metrics", step)
+                }
+                Ok(Event::Result { outcome, .. }) => {
+                    found.result = Some(outcome);
+                    continue;
+                }
+                Err(error) => {
+                    found.damage = Some(error);
+                    break;
+                }
+            };
+            let steps = found
+                .channels
+                .entry(channel.to_owned())
+                .or_insert((0, step, step));
+            *steps = (steps.0 + 1, steps.1.min(step), steps.2.max(step));
+        }
+        found
+    }
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    let mut recording = Recording::open(&arguments.file)?;
+    let found = Findings::of(&mut recording);
+    let closed = recording.is_closed();
+    if arguments.json {
+        print(&json(&recording, &found, closed))?;
+    } else {
+        print(&text(
+            &arguments.file.display().to_string(),
+            &recording,
+            &found,
+            closed,
+        ))?;
+    }
+    match found.damage {
+        Some(error) => Err(error.into()),
+        None => Ok(Verdict::Good),
+    }
+}
+
+fn state_of(found: &Findings, closed: bool) -> String {
+    match (found.result, closed) {
+        (Some(end), _) if end.converged => {
+            format!(
+                "converged in {} steps, f_max = {:.3e} γ",
+                end.steps, end.f_max
+            )
+        }
+        (Some(end), _) => {
+            format!(
+                "not converged within {} steps, f_max = {:.3e} γ",
+                end.steps, end.f_max
+            )
+        }
+        (None, true) => "unfinished: the run was interrupted".to_owned(),
+        (None, false) => "unfinished: the file breaks off".to_owned(),
+    }
+}
+
+fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<14} {value}");
+    };
+    let l = recording.domain().lengths();
+    let scene = recording.scene();
+    line("file", path.to_owned());
+    line("recorded by", recording.program().to_owned());
+    line("result", state_of(found, closed));
+    line(
+        "packing",
+        format!(
+            "N = {}, φ = {:.4}, box {:.3} × {:.3}, γ = {}",
+            recording.radii().len(),
+            recording.coverage(),
+            l.x,
+            l.y,
+            scene.line_tension
+        ),
+    );
+    for (channel, (count, first, last)) in &found.channels {
+        line(channel, format!("{count} steps, {first} … {last}"));
+    }
+    if !found.channels.contains_key("state") {
+        line(
+            "state",
+            "none: the recording can be looked at, not replayed".to_owned(),
+        );
+    }
+    for (name, value) in &found.metrics {
+        line(name, format!("{value:.6e}"));
+    }
+    text
+}
+
+fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
+    let l = recording.domain().lengths();
+    let channels: serde_json::Map<String, serde_json::Value> = found
+        .channels
+        .iter()
+        .map(|(name, (count, first, last))| {
+            let value = serde_json::json!({ "steps": count, "first": first, "last": last });
+            (name.clone(), value)
+        })
+        .collect();
+    let value = serde_json::json!({
+        "program": recording.program(),
+        "particles": recording.radii().len(),
+        "phi": recording.coverage(),
+        "box": [l.x, l.y],
+        "closed": closed,
+        "converged": found.result.map(|r| r.converged),
+        "steps": found.result.map(|r| r.steps),
+        "f_max": found.result.map(|r| r.f_max),
+        "channels": channels,
+        "metrics": found.metrics,
+        "damage": found.damage.as_ref().map(ToString::to_string),
+        "scene": recording.scene().to_toml(),
+    });
+    format!("{value:#}\n")
+}

@@ -1,0 +1,94 @@
+//! The command line: parsing, dispatch, exit codes. One file a verb.
+//!
+//! Results go to standard output, diagnostics and the progress bar to standard error.
+
+mod flags;
+mod info;
+mod record;
+mod scene;
+
+use clap::{Parser, Subcommand};
+use softjam::record::RecordError;
+use softjam::relax::RelaxError;
+use softjam::scene::SceneError;
+use std::io::Write as _;
+use std::process::ExitCode;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done, and the verdict is good (converged)
+  1  could not be done: I/O, a damaged file, a numerical failure, an interruption
+  2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way
+  3  done, and the verdict is bad (not converged within the step limit)";
+
+/// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
+#[derive(Parser)]
+#[command(version, about, long_about = None, after_help = EXIT_CODES, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Relax a scene and record it.
+    Record(record::Arguments),
+    /// Say what a recording holds.
+    Info(info::Arguments),
+    /// Print a scene file: the default one, or a file and flags with every field filled in.
+    Scene(scene::Arguments),
+}
+
+/// How a verb ended well, or at least in order.
+enum Verdict {
+    Good,
+    Bad,
+    /// The user ended it.
+    Interrupted,
+}
+
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.verb {
+        Verb::Record(arguments) => record::run(&arguments),
+        Verb::Info(arguments) => info::run(&arguments),
+        Verb::Scene(arguments) => scene::run(&arguments),
+    };
+    match result {
+        Ok(Verdict::Good) => ExitCode::SUCCESS,
+        Ok(Verdict::Bad) => ExitCode::from(3),
+        Ok(Verdict::Interrupted) => ExitCode::from(1),
+        Err(error) => {
+            // Nobody is left to tell if standard error is closed too.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+/// 2 for a request that makes no sense, 1 for one that could not be met.
+fn exit_code(error: &anyhow::Error) -> u8 {
+    let scene = |e: &SceneError| match e {
+        SceneError::Read { .. } => 1,
+        _ => 2,
+    };
+    if let Some(e) = error.downcast_ref::<SceneError>() {
+        return scene(e);
+    }
+    match (
+        error.downcast_ref::<RelaxError>(),
+        error.downcast_ref::<RecordError>(),
+    ) {
+        (Some(RelaxError::Scene(e)), _) => scene(e),
+        (_, Some(RecordError::Exists { .. })) => 2,
+        _ => 1,
+    }
+}
+
+/// Writes a result to standard output; a closed pipe (`| head`) is no failure.
+fn print(text: &str) -> anyhow::Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}

@@ -1,0 +1,19 @@
+//! `softjam scene`: prints a scene file.
+
+use super::{Verdict, flags::SceneFlags, print};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  softjam scene > scene.toml              the default scene, every field with its meaning
+  softjam scene --phi 0.9 -N 1024         the same with two fields changed
+  softjam scene mine.toml                 checks a file and fills in what it leaves out")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneFlags,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    print(&arguments.scene.scene()?.to_toml())?;
+    Ok(Verdict::Good)
+}

@@ -1,0 +1,500 @@
+//! The `.rrd` recorder: which entity holds what, and when it is written.
+//!
+//! | entity | content |
+//! | --- | --- |
+//! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program` |
+//! | `/world`, `/world/box` | y up; the periodic box |
+//! | `/world/contours` | particle polygons, coloured by the pressure on the particle |
+//! | `/world/contacts` | a segment a contact between the centres, width and colour by the force |
+//! | `/metrics/*` | one scalar each |
+//! | `/particles` | `softjam.Particles:radius`, `:box` (the sides) |
+//! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless |
+//! | `/result` | `softjam.Result:converged`, `:steps`, `:f_max`, `:digest`; its absence means an unfinished run |
+//!
+//! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
+//! steps are written together, the state last.
+
+use super::encode::Encoder;
+use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Snapshot, Written, blueprint};
+use crate::contact::{Contacts, FrameContacts};
+use crate::domain::Vec2;
+use crate::droplet::contour::Contours;
+use crate::force::Observables;
+use crate::frame::Frame;
+use crate::packing::Packing;
+use crate::scene::Scene;
+use core::f64::consts::PI;
+use rerun::external::arrow::array::{
+    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, ListArray, StringArray, UInt8Array,
+    UInt32Array, UInt64Array,
+};
+use rerun::external::arrow::buffer::OffsetBuffer;
+use rerun::external::arrow::datatypes::{DataType, Field};
+use rerun::external::re_log_types::StoreId;
+use rerun::log::{Chunk, RowId};
+use rerun::{
+    AsComponents, Color, DynamicArchetype, LineStrips2D, Radius, Scalars, TextDocument, TimeColumn,
+    TimePoint, Timeline, Transform3D,
+};
+use std::io::{self, Write};
+use std::sync::Arc;
+
+/// The entities of `/metrics`, in the order of [`metric_values`].
+const METRICS: [&str; 9] = [
+    "f_max",
+    "log10_f_max",
+    "energy",
+    "pressure",
+    "coordination",
+    "contacts",
+    "rattlers",
+    "dt",
+    "stress_xy",
+];
+
+fn metric_values(o: &Observables) -> [f64; METRICS.len()] {
+    [
+        o.f_max,
+        // The viewer has no logarithmic axis; the floor keeps a perfect balance on the plot.
+        libm::log10(o.f_max.max(1e-18)),
+        o.energy,
+        o.pressure(),
+        o.coordination(),
+        o.contacts as f64,
+        o.rattlers as f64,
+        o.dt,
+        o.stress[1],
+    ]
+}
+
+/// A batch is written when it holds this many bytes or steps.
+const BATCH_BYTES: usize = 1 << 20;
+const BATCH_STEPS: usize = 512;
+
+/// Writes snapshots as an `.rrd` stream.
+///
+/// # Example
+///
+/// Two runs of one scene give the same bytes:
+///
+/// ```
+/// use softjam::{record::{RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
+///
+/// let scene = Scene { particles: 32, ..Scene::default() };
+/// let record = || {
+///     let mut run = Relaxation::new(&scene).unwrap();
+///     let mut bytes = Vec::new();
+///     let mut recorder = RrdRecorder::new(&mut bytes, scene.clone(), run.packing().clone()).unwrap();
+///     for _ in 0..20 {
+///         if let Some(snapshot) = Snapshot::of(&run, &scene.channels, false) {
+///             recorder.record(&snapshot).unwrap();
+///         }
+///         run.advance().unwrap();
+///     }
+///     recorder.finish(None).unwrap();
+///     drop(recorder);
+///     bytes
+/// };
+/// assert_eq!(record(), record());
+/// ```
+pub struct RrdRecorder<W> {
+    encoder: Encoder<W>,
+    store: StoreId,
+    packing: Packing,
+    line_tension: f64,
+    contours: Contours,
+    pending: Pending,
+    intact: Option<u64>,
+    states: u64,
+    digests: blake3::Hasher,
+}
+
+/// Rows that wait to be written: the entity's place in [`Pending::rows`] and its data.
+#[derive(Default)]
+struct Pending {
+    metrics: Vec<(u64, i64, [f64; METRICS.len()])>,
+    contours: Vec<Row<LineStrips2D>>,
+    contacts: Vec<Row<LineStrips2D>>,
+    states: Vec<Row<DynamicArchetype>>,
+    bytes: usize,
+    steps: usize,
+    last: Option<u64>,
+}
+
+struct Row<T> {
+    time: TimePoint,
+    data: T,
+}
+
+impl<W: Write> RrdRecorder<W> {
+    /// Starts a recording of `scene` with the radii and the box of `packing`: blueprint, scene, box, radii.
+    ///
+    /// # Errors
+    ///
+    /// Whatever `sink` fails with.
+    ///
+    /// See the example of [`RrdRecorder`].
+    pub fn new(sink: W, scene: Scene, packing: Packing) -> io::Result<Self> {
+        let header = Header { scene, packing };
+        let mut encoder = Encoder::new(sink)?;
+        let id = blake3::Hash::from_bytes(header.scene.digest()).to_hex();
+        let recording = &id.as_str()[..32];
+        blueprint::write(&mut encoder, recording, header.packing.domain())?;
+        let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
+        encoder.open(&store)?;
+        write_header(&mut encoder, &store, &header)?;
+        Ok(Self {
+            encoder,
+            store,
+            line_tension: header.scene.line_tension,
+            contours: Contours::new(header.scene.contours),
+            packing: header.packing,
+            pending: Pending::default(),
+            intact: None,
+            states: 0,
+            digests: blake3::Hasher::new(),
+        })
+    }
+
+    /// Records a snapshot. It reaches the sink with its batch.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step it holds in full.
+    ///
+    /// See the example of [`RrdRecorder`].
+    pub fn record(&mut self, snapshot: &Snapshot) -> io::Result<()> {
+        let nanoseconds = (snapshot.time * 1e9) as i64;
+        if let Some(o) = &snapshot.metrics {
+            self.pending
+                .metrics
+                .push((snapshot.step, nanoseconds, metric_values(o)));
+            self.pending.bytes += 24 * METRICS.len();
+        }
+        if let Some(frame) = &snapshot.frame {
+            let time = TimePoint::default()
+                .with(Timeline::new_sequence("step"), snapshot.step as i64)
+                .with(Timeline::new_duration("sim_time"), nanoseconds);
+            self.record_frame(snapshot, frame, &time);
+        }
+        self.pending.steps += 1;
+        self.pending.last = Some(snapshot.step);
+        if self.pending.bytes >= BATCH_BYTES || self.pending.steps >= BATCH_STEPS {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame, time: &TimePoint) {
+        let row = |data| Row {
+            time: time.clone(),
+            data,
+        };
+        if snapshot.contours || snapshot.contacts {
+            let contacts = FrameContacts::of(&self.packing, frame);
+            let contacts = contacts.view();
+            if snapshot.contours {
+                self.contours.draw(
+                    self.packing.radii(),
+                    &frame.positions,
+                    &contacts,
+                    self.line_tension,
+                );
+                let strips = contour_strips(&self.contours, self.packing.radii(), &contacts);
+                self.pending.contours.push(row(strips));
+                self.pending.bytes += 8 * self.contours.vertices();
+            }
+            if snapshot.contacts {
+                let strips = contact_strips(&frame.positions, self.packing.radii(), &contacts);
+                self.pending.contacts.push(row(strips));
+                self.pending.bytes += 24 * contacts.pairs.len();
+            }
+        }
+        if snapshot.state {
+            let digest = frame.digest();
+            self.digests.update(&digest);
+            self.states += 1;
+            self.pending.states.push(Row {
+                time: time.clone(),
+                data: state(frame, &digest),
+            });
+            self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
+        }
+    }
+
+    /// Writes the batch at hand.
+    fn flush(&mut self) -> io::Result<()> {
+        let Pending {
+            metrics,
+            contours,
+            contacts,
+            states,
+            last,
+            ..
+        } = core::mem::take(&mut self.pending);
+        self.write_rows("/world/contours", contours)?;
+        self.write_rows("/world/contacts", contacts)?;
+        self.write_metrics(&metrics)?;
+        self.write_rows("/state", states)?;
+        self.intact = last.or(self.intact);
+        Ok(())
+    }
+
+    fn write_rows<T: AsComponents>(&mut self, entity: &str, rows: Vec<Row<T>>) -> io::Result<()> {
+        if rows.is_empty() {
+            return Ok(());
+        }
+        let mut builder = Chunk::builder_with_id(self.encoder.chunk_id(), entity);
+        for row in rows {
+            builder = builder.with_archetype(self.encoder.row_id(), row.time, &row.data);
+        }
+        self.encoder
+            .append(&self.store, &builder.build().map_err(io::Error::other)?)
+    }
+
+    /// Metrics column by column: a row is too little data to be built by itself.
+    fn write_metrics(&mut self, rows: &[(u64, i64, [f64; METRICS.len()])]) -> io::Result<()> {
+        if rows.is_empty() {
+            return Ok(());
+        }
+        for (k, name) in METRICS.iter().enumerate() {
+            let timelines = [
+                TimeColumn::new_sequence("step", rows.iter().map(|r| r.0 as i64)),
+                TimeColumn::new_duration_nanos("sim_time", rows.iter().map(|r| r.1)),
+            ];
+            let values: ArrayRef =
+                Arc::new(Float64Array::from_iter_values(rows.iter().map(|r| r.2[k])));
+            let item = Arc::new(Field::new("item", DataType::Float64, true));
+            let lengths = core::iter::repeat_n(1, rows.len());
+            let list = ListArray::new(item, OffsetBuffer::from_lengths(lengths), values, None);
+            let id = self.encoder.chunk_id();
+            let row_ids: Vec<RowId> = rows.iter().map(|_| self.encoder.row_id()).collect();
+            let chunk = Chunk::from_native_row_ids(
+                id,
+                format!("/metrics/{name}").into(),
+                None,
+                &row_ids,
+                timelines
+                    .into_iter()
+                    .map(|t| (*t.timeline().name(), t))
+                    .collect(),
+                core::iter::once((Scalars::descriptor_scalars(), list)).collect(),
+            )
+            .map_err(io::Error::other)?;
+            self.encoder.append(&self.store, &chunk)?;
+        }
+        Ok(())
+    }
+
+    /// The last step that the sink holds in full.
+    ///
+    /// ```
+    /// use softjam::{record::RrdRecorder, relax::Relaxation, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let packing = Relaxation::new(&scene).unwrap().packing().clone();
+    /// let recorder = RrdRecorder::new(Vec::new(), scene, packing).unwrap();
+    /// assert_eq!(recorder.intact(), None);
+    /// ```
+    #[must_use]
+    pub fn intact(&self) -> Option<u64> {
+        self.intact
+    }
+
+    /// Bytes of the whole messages written so far.
+    ///
+    /// ```
+    /// # use softjam::{record::RrdRecorder, relax::Relaxation, scene::Scene};
+    /// # let scene = Scene { particles: 32, ..Scene::default() };
+    /// # let packing = Relaxation::new(&scene).unwrap().packing().clone();
+    /// # let recorder = RrdRecorder::new(Vec::new(), scene, packing).unwrap();
+    /// assert!(recorder.written() > 0);
+    /// ```
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.encoder.written()
+    }
+
+    /// Writes what is left, the outcome and the footer. Without an outcome the recording is one of an unfinished run.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the sink fails with.
+    ///
+    /// See the example of [`RrdRecorder`].
+    pub fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written> {
+        self.flush()?;
+        if let Some(outcome) = outcome {
+            let digest = *self.digests.finalize().as_bytes();
+            let result = DynamicArchetype::new("softjam.Result")
+                .with_component_from_data(
+                    "converged",
+                    array(BooleanArray::from(vec![outcome.converged])),
+                )
+                .with_component_from_data("steps", array(UInt64Array::from(vec![outcome.steps])))
+                .with_component_from_data("f_max", array(Float64Array::from(vec![outcome.f_max])))
+                .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())));
+            self.encoder
+                .single(&self.store, "/result", TimePoint::default(), &result)?;
+        }
+        self.encoder.finish()?;
+        Ok(Written {
+            bytes: self.encoder.written(),
+            states: self.states,
+        })
+    }
+}
+
+fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
+    Arc::new(array)
+}
+
+/// Scene, axes, box and radii: what does not change.
+fn write_header<W: Write>(
+    encoder: &mut Encoder<W>,
+    store: &StoreId,
+    header: &Header,
+) -> io::Result<()> {
+    let packing = &header.packing;
+    let toml = header.scene.to_toml();
+    let l = packing.domain().lengths();
+    let text = format!(
+        "# Deformable particles\n\n\
+         Morse–Witten model, recorded by {PROGRAM}.\n\n\
+         | | |\n| --- | --- |\n\
+         | particles | {} |\n| coverage φ | {:.6} |\n| box | {:.6} × {:.6} |\n| line tension γ | {} |\n| threshold on f_max | {:e} γ |\n\n\
+         ```toml\n{toml}```\n",
+        packing.len(),
+        packing.coverage(),
+        l.x,
+        l.y,
+        header.scene.line_tension,
+        header.scene.threshold,
+    );
+    let document = TextDocument::from_markdown(text);
+    let scene = DynamicArchetype::new("softjam.Scene")
+        .with_component_from_data("toml", array(StringArray::from(vec![toml])))
+        .with_component_from_data(
+            "format_version",
+            array(UInt32Array::from(vec![FORMAT_VERSION])),
+        )
+        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])));
+    let particles = DynamicArchetype::new("softjam.Particles")
+        .with_component_from_data(
+            "radius",
+            array(Float64Array::from(packing.radii().to_vec())),
+        )
+        .with_component_from_data("box", array(Float64Array::from(vec![l.x, l.y])));
+    // Rerun's 2D views have y down, a packing has it up.
+    let up = Transform3D::from_mat3x3([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
+    let (x, y) = (l.x as f32, l.y as f32);
+    let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
+    let frame = LineStrips2D::new([corners])
+        .with_colors([Color::from_rgb(140, 140, 140)])
+        .with_radii([Radius::new_ui_points(1.0)]);
+    let outline = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.1)]);
+    let graph = LineStrips2D::update_fields().with_draw_order(31.0);
+    let everywhere: [(&str, &dyn AsComponents); 7] = [
+        ("/scene", &document),
+        ("/scene", &scene),
+        ("/particles", &particles),
+        ("/world", &up),
+        ("/world/box", &frame),
+        ("/world/contours", &outline),
+        ("/world/contacts", &graph),
+    ];
+    for (entity, data) in everywhere {
+        encoder.single(store, entity, TimePoint::default(), data)?;
+    }
+    Ok(())
+}
+
+/// The lossless state.
+fn state(frame: &Frame, digest: &[u8; 32]) -> DynamicArchetype {
+    let pairs_of = |v: &[Vec2]| {
+        let flat = Float64Array::from_iter_values(v.iter().flat_map(|p| [p.x, p.y]));
+        pairs(DataType::Float64, array(flat))
+    };
+    let contacts = UInt32Array::from_iter_values(frame.contacts.iter().flatten().copied());
+    DynamicArchetype::new("softjam.State")
+        .with_component_from_data("position", pairs_of(&frame.positions))
+        .with_component_from_data("velocity", pairs_of(&frame.velocities))
+        .with_component_from_data("contact", pairs(DataType::UInt32, array(contacts)))
+        .with_component_from_data("force", array(Float64Array::from(frame.forces.clone())))
+        .with_component_from_data(
+            "minimizer",
+            array(Float64Array::from(frame.minimizer.values().to_vec())),
+        )
+        .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())))
+}
+
+fn pairs(of: DataType, flat: ArrayRef) -> ArrayRef {
+    let item = Arc::new(Field::new("item", of, false));
+    array(FixedSizeListArray::new(item, 2, flat, None))
+}
+
+/// Closed polygons, coloured by the pressure `Σ_j f_ij / 2πR_i` on the particle, relative to the mean over the frame.
+fn contour_strips(contours: &Contours, radii: &[f64], contacts: &Contacts<'_>) -> LineStrips2D {
+    let mut pressure = vec![0.0; radii.len()];
+    for (&[i, j], f) in contacts.pairs.iter().zip(contacts.forces) {
+        pressure[i as usize] += f;
+        pressure[j as usize] += f;
+    }
+    for (p, r) in pressure.iter_mut().zip(radii) {
+        *p /= 2.0 * PI * r;
+    }
+    let mean = pressure.iter().sum::<f64>() / radii.len() as f64;
+    let colors = pressure.iter().map(|&p| {
+        if p > 0.0 {
+            shade(colorous::VIRIDIS, 0.3 + 0.7 * (p / mean / 2.0).min(1.0))
+        } else {
+            Color::from_rgb(120, 120, 120)
+        }
+    });
+    let colors: Vec<Color> = colors.collect();
+    let strips = (0..contours.len()).map(|p| {
+        let polygon = contours.polygon(p);
+        let closed = polygon.iter().chain(polygon.first());
+        closed
+            .map(|v| [v.x as f32, v.y as f32])
+            .collect::<Vec<[f32; 2]>>()
+    });
+    LineStrips2D::new(strips).with_colors(colors)
+}
+
+/// A segment a contact from the centre of `i` to the nearest image of `j`, width and colour by `f/⟨f⟩`.
+fn contact_strips(positions: &[Vec2], radii: &[f64], contacts: &Contacts<'_>) -> LineStrips2D {
+    let number = contacts.forces.len().max(1) as f64;
+    let mean = contacts.forces.iter().sum::<f64>() / number;
+    let mean_radius = radii.iter().sum::<f64>() / radii.len() as f64;
+    let relative: Vec<f64> = contacts
+        .forces
+        .iter()
+        .map(|f| {
+            if mean > 0.0 {
+                (f / mean).clamp(0.0, 3.0)
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let strips = contacts.pairs.iter().enumerate().map(|(c, &[i, _])| {
+        let from = positions[i as usize];
+        let to = from - contacts.normals[c] * contacts.distances[c];
+        [[from.x as f32, from.y as f32], [to.x as f32, to.y as f32]]
+    });
+    let widths = relative
+        .iter()
+        .map(|&r| Radius::new_scene_units((0.05 * mean_radius * (0.2 + r)) as f32));
+    let colors = relative
+        .iter()
+        .map(|&r| shade(colorous::INFERNO, 0.45 + 0.5 * r / 3.0));
+    LineStrips2D::new(strips)
+        .with_radii(widths)
+        .with_colors(colors)
+}
+
+fn shade(map: colorous::Gradient, at: f64) -> Color {
+    let c = map.eval_continuous(at);
+    Color::from_rgb(c.r, c.g, c.b)
+}

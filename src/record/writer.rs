@@ -1,0 +1,209 @@
+//! The thread that encodes and writes, behind a bounded queue.
+
+use super::{Header, Outcome, RecordError, RrdRecorder, Snapshot};
+use crate::packing::Packing;
+use crate::scene::Scene;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+/// Snapshots that may wait for the disk before the run does.
+const QUEUE: usize = 8;
+
+/// A recording in the making: takes snapshots, encodes and writes them on a thread of its own.
+///
+/// # Example
+///
+/// See the [module](super).
+#[derive(Debug)]
+pub struct Writer {
+    queue: Option<SyncSender<Message>>,
+    thread: Option<JoinHandle<Result<Written, Failure>>>,
+    path: String,
+}
+
+/// What was written.
+///
+/// ```
+/// assert_eq!(softjam::record::Written::default().states, 0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Size of the file (bytes).
+    pub bytes: u64,
+    /// Frames whose state was recorded.
+    pub states: u64,
+}
+
+#[derive(Debug)]
+enum Message {
+    Snapshot(Box<Snapshot>),
+    Finish(Option<Outcome>),
+}
+
+#[derive(Debug)]
+struct Failure {
+    step: u64,
+    intact: Option<u64>,
+    source: io::Error,
+}
+
+impl Writer {
+    /// Creates the file of a recording and starts it; an existing file is replaced only if `replace` says so.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Exists`] or [`RecordError::Create`].
+    ///
+    /// ```
+    /// use softjam::{record::Writer, relax::Relaxation, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// let error = Writer::create("/nowhere/run.rrd", false, &scene, run.packing()).unwrap_err();
+    /// assert!(error.to_string().starts_with("cannot create /nowhere/run.rrd"));
+    /// ```
+    pub fn create(
+        path: impl AsRef<Path>,
+        replace: bool,
+        scene: &Scene,
+        packing: &Packing,
+    ) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let name = path.display().to_string();
+        let mut options = OpenOptions::new();
+        options.write(true);
+        if replace {
+            options.create(true).truncate(true);
+        } else {
+            options.create_new(true);
+        }
+        let file = options.open(path).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => RecordError::Exists { path: name.clone() },
+            _ => RecordError::Create {
+                path: name.clone(),
+                source,
+            },
+        })?;
+        let header = Header {
+            scene: scene.clone(),
+            packing: packing.clone(),
+        };
+        let (queue, messages) = sync_channel(QUEUE);
+        let thread = std::thread::Builder::new()
+            .name("softjam-recorder".to_owned())
+            .spawn(move || write(file, header, &messages))
+            .map_err(|source| RecordError::Create {
+                path: name.clone(),
+                source,
+            })?;
+        Ok(Self {
+            queue: Some(queue),
+            thread: Some(thread),
+            path: name,
+        })
+    }
+
+    /// Hands a snapshot to the thread; waits while the queue is full.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Write`] if an earlier snapshot could not be written.
+    ///
+    /// See the example of the [module](super).
+    pub fn send(&mut self, snapshot: Snapshot) -> Result<(), RecordError> {
+        self.post(Message::Snapshot(Box::new(snapshot)))
+    }
+
+    /// Writes what is left and closes the file; without an outcome the recording is marked as unfinished.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Write`].
+    ///
+    /// See the example of the [module](super).
+    pub fn finish(mut self, outcome: Option<Outcome>) -> Result<Written, RecordError> {
+        self.post(Message::Finish(outcome))?;
+        self.join()
+    }
+
+    fn post(&mut self, message: Message) -> Result<(), RecordError> {
+        let sent = self.queue.as_ref().map(|queue| queue.send(message));
+        match sent {
+            Some(Ok(())) => Ok(()),
+            // The thread is gone: it has left the reason behind.
+            _ => self.join().map(|_| ()),
+        }
+    }
+
+    fn join(&mut self) -> Result<Written, RecordError> {
+        self.queue = None;
+        let lost = || Failure {
+            step: 0,
+            intact: None,
+            source: io::Error::other("the recorder has already ended"),
+        };
+        let result = match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(result)) => result,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            None => Err(lost()),
+        };
+        result.map_err(|failure| RecordError::Write {
+            path: self.path.clone(),
+            step: failure.step,
+            intact: failure.intact,
+            source: failure.source,
+        })
+    }
+}
+
+/// A writer that is dropped without [`Writer::finish`] leaves what it was given, unfinished but readable.
+impl Drop for Writer {
+    fn drop(&mut self) {
+        self.queue = None;
+        if let Some(thread) = self.thread.take() {
+            // Whoever drops a writer has another failure to report.
+            drop(thread.join());
+        }
+    }
+}
+
+/// The thread's work.
+fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Written, Failure> {
+    let mut step = 0;
+    let start = |source| Failure {
+        step: 0,
+        intact: None,
+        source,
+    };
+    let cut = file.try_clone().map_err(start)?;
+    let mut recorder = RrdRecorder::new(file, header.scene, header.packing).map_err(start)?;
+    let mut outcome = None;
+    let mut result = Ok(());
+    while result.is_ok() {
+        match messages.recv() {
+            Ok(Message::Snapshot(snapshot)) => {
+                step = snapshot.step;
+                result = recorder.record(&snapshot);
+            }
+            Ok(Message::Finish(end)) => {
+                outcome = end;
+                break;
+            }
+            Err(_) => break,
+        }
+    }
+    result
+        .and_then(|()| recorder.finish(outcome))
+        .map_err(|source| {
+            // A message that reached the disk in part would be a torn end. What is no file cannot be cut, and need not be.
+            drop(cut.set_len(recorder.written()));
+            Failure {
+                step,
+                intact: recorder.intact(),
+                source,
+            }
+        })
+}

@@ -1,0 +1,136 @@
+//! Reading recordings back.
+//!
+//! [`Recording`] streams a file: its scene and radii first, then what was recorded, in the order of the file. Memory
+//! does not grow with the file. A frame comes out with the bits it went in with, and its digest is checked on the way.
+
+mod rrd;
+
+pub use rrd::Recording;
+
+use crate::frame::{Frame, FrameError};
+use crate::record::Outcome;
+use crate::scene::SceneError;
+
+/// Something that a recording holds behind its header.
+///
+/// ```
+/// use softjam::replay::Event;
+/// assert!(matches!(Event::Drawn { channel: "contours", step: 0 }, Event::Drawn { step: 0, .. }));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A recorded state; its digest was right.
+    State(Frame),
+    /// One scalar of `/metrics`.
+    Metric {
+        /// Its name, such as `f_max`.
+        name: String,
+        /// The step.
+        step: u64,
+        /// Its value.
+        value: f64,
+    },
+    /// The contours or the contacts of a step, which are for the eye and can be rebuilt from the state.
+    Drawn {
+        /// `contours` or `contacts`.
+        channel: &'static str,
+        /// The step.
+        step: u64,
+    },
+    /// How the run ended, and the digest over the digests of all recorded states.
+    Result {
+        /// How it ended.
+        outcome: Outcome,
+        /// BLAKE3 over the digests of the recorded frames in order.
+        digest: [u8; 32],
+    },
+}
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("cannot read {path}: {source}")]
+    Open {
+        /// Path of the file.
+        path: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not an `.rrd` stream.
+    #[error("{path} is not a rerun recording: {problem}")]
+    NotRrd {
+        /// Path of the file.
+        path: String,
+        /// What rerun's decoder says.
+        problem: String,
+    },
+    /// An `.rrd` stream of another program, or one that breaks off before its scene.
+    #[error("{path} is not a softjam recording: it has no {missing}")]
+    NotSoftjam {
+        /// Path of the file.
+        path: String,
+        /// What is missing.
+        missing: &'static str,
+    },
+    /// The recording is of a later version of the layout.
+    #[error(
+        "{path} has format version {found}, this program reads up to {known}: use a newer softjam"
+    )]
+    Newer {
+        /// Path of the file.
+        path: String,
+        /// Its version.
+        found: u32,
+        /// The newest version known here.
+        known: u32,
+    },
+    /// The scene in the recording does not parse.
+    #[error("the scene in {path} cannot be read: {source}")]
+    Scene {
+        /// Path of the file.
+        path: String,
+        /// What is wrong with it.
+        source: SceneError,
+    },
+    /// The stream is damaged.
+    #[error("{path} is damaged: {problem}; {}", intact_up_to(*intact))]
+    Damaged {
+        /// Path of the file.
+        path: String,
+        /// What is wrong.
+        problem: String,
+        /// The last recorded state before the damage.
+        intact: Option<u64>,
+    },
+    /// A frame is not one that a run can give.
+    #[error("{path}: the state at step {step} is damaged: {source}; {}", intact_up_to(*intact))]
+    Frame {
+        /// Path of the file.
+        path: String,
+        /// The step.
+        step: u64,
+        /// What is wrong.
+        source: FrameError,
+        /// The last recorded state before it.
+        intact: Option<u64>,
+    },
+    /// The state of a frame does not have the digest that was recorded with it.
+    #[error("{path}: the digest of step {step} differs, so its state was changed after it was written; {}", intact_up_to(*intact))]
+    Digest {
+        /// Path of the file.
+        path: String,
+        /// The step.
+        step: u64,
+        /// The last recorded state before it.
+        intact: Option<u64>,
+    },
+}
+
+fn intact_up_to(intact: Option<u64>) -> String {
+    match intact {
+        Some(step) => format!("intact up to step {step}"),
+        None => "no state before it".to_owned(),
+    }
+}

@@ -1,0 +1,296 @@
+//! The contact law: what an answer fulfils, that there is only one, and what it does not depend on.
+
+use super::model::Model;
+use crate::common::{
+    Random, answer, assert_at_most, largest_difference, law, random_packing, relaxed_disks, scene,
+    solved,
+};
+use proptest::test_runner::{Config, TestCaseError, TestRunner};
+use softjam::contact::solver::Method;
+use softjam::contact::{ContactError, ContactLaw, Rule};
+use softjam::domain::{Domain, Vec2};
+use softjam::packing::Packing;
+use softjam::relax::Relaxation;
+
+/// Packings for the uniqueness and the invariances: before, at and far from balance.
+fn packings() -> Vec<Packing> {
+    let mut random = Random::new(21);
+    let mut list: Vec<Packing> = [(0.86, 1), (0.9, 2), (1.0, 3)]
+        .map(|(phi, seed)| relaxed_disks(90, phi, seed))
+        .into();
+    for (phi, ratio, steps) in [(0.85, 1.4, 12), (0.95, 2.0, 40), (1.05, 1.4, 80)] {
+        list.push(random_packing(&mut random, 90, phi, ratio, steps));
+    }
+    list
+}
+
+#[test]
+fn forces_and_gaps_are_never_negative_and_never_both_positive() {
+    let config = Config {
+        cases: 60,
+        // A refused packing does not count: 60 are solved, or the test fails.
+        max_global_rejects: 600,
+        failure_persistence: None,
+        ..Config::default()
+    };
+    let cases = (
+        0..u64::MAX,
+        20..=80usize,
+        0.80..1.1f64,
+        1.0..5.0f64,
+        0..60u64,
+    );
+    let mut worst: [f64; 2] = [0.0; 2];
+    let mut refused = 0;
+    let worst_of = std::cell::RefCell::new(&mut worst);
+    let refused_of = std::cell::RefCell::new(&mut refused);
+    TestRunner::new(config)
+        .run(&cases, |(seed, particles, phi, ratio, steps)| {
+            let packing = random_packing(&mut Random::new(seed), particles, phi, ratio, steps);
+            let mut law = ContactLaw::default();
+            match law.solve(&packing, &[], &[]) {
+                Err(ContactError::BoxTooSmall { .. }) => {
+                    **refused_of.borrow_mut() += 1;
+                    return Err(TestCaseError::reject("box too small"));
+                }
+                Err(error) => return Err(TestCaseError::fail(error.to_string())),
+                Ok(()) => {}
+            }
+            let contacts = law.contacts();
+            let scale = contacts
+                .overlaps
+                .iter()
+                .fold(0.0, |m: f64, d| m.max(d.abs()));
+            let tolerance = law.accepted_residual() * scale.max(f64::MIN_POSITIVE);
+            let model = Model::new(&packing, contacts.pairs, contacts.forces, 1.0);
+            let pulling = contacts.forces.iter().find(|f| **f < 0.0);
+            proptest::prop_assert!(pulling.is_none(), "force {pulling:?}");
+            let at_contacts = model.largest_gap_at_contacts();
+            let elsewhere = -model.smallest_gap_elsewhere();
+            let mut worst = worst_of.borrow_mut();
+            worst[0] = worst[0].max(at_contacts / scale.max(1e-300));
+            worst[1] = worst[1].max(elsewhere / scale.max(1e-300));
+            proptest::prop_assert!(at_contacts <= tolerance, "gap {at_contacts:e} at a contact");
+            proptest::prop_assert!(elsewhere <= tolerance, "overlap {elsewhere:e} elsewhere");
+            Ok(())
+        })
+        .unwrap();
+    println!("refused {refused}");
+    assert_at_most(
+        "gap at a contact over the largest overlap",
+        worst[0],
+        1.6e-11,
+    );
+    assert_at_most(
+        "overlap elsewhere over the largest overlap",
+        worst[1],
+        1.6e-11,
+    );
+}
+
+#[test]
+fn answer_does_not_depend_on_the_first_guess() {
+    let mut random = Random::new(77);
+    let mut worst: f64 = 0.0;
+    for packing in packings() {
+        let expected = answer(&solved(&packing));
+        let n = packing.len();
+        for attempt in 0..24 {
+            // Every third guess is a part of the answer, every third holds much more, every third has little to do with it.
+            let guess: Vec<[u32; 2]> = (0..n as u32)
+                .flat_map(|i| (i + 1..n as u32).map(move |j| [i, j]))
+                .filter(|&[i, j]| {
+                    let (i, j) = (i as usize, j as usize);
+                    let surface =
+                        packing.separation(i, j).norm() - packing.radii()[i] - packing.radii()[j];
+                    match attempt % 3 {
+                        0 => surface < 0.0 && random.below(3) > 0,
+                        1 => surface < 0.3 && random.below(5) > 0,
+                        _ => random.below(40) == 0,
+                    }
+                })
+                .collect();
+            let forces: Vec<f64> = guess.iter().map(|_| random.within(-1.0, 3.0)).collect();
+            let mut law = ContactLaw::default();
+            law.solve(&packing, &guess, &forces)
+                .unwrap_or_else(|e| panic!("attempt {attempt}: {e}"));
+            worst = worst.max(largest_difference(&answer(&law), &expected));
+        }
+    }
+    assert_at_most("force from another guess, difference", worst, 1e-10);
+}
+
+#[test]
+fn answer_from_the_step_before_is_the_answer_from_nothing() {
+    let mut worst: f64 = 0.0;
+    for (phi, seed) in [(0.86, 4), (0.92, 5)] {
+        let mut run = Relaxation::new(&scene(80, phi, seed)).unwrap();
+        for _ in 0..200 {
+            let before = run.frame();
+            run.advance().unwrap();
+            let cold = solved(run.packing());
+            let mut warm = ContactLaw::default();
+            warm.solve(run.packing(), &before.contacts, &before.forces)
+                .unwrap();
+            worst = worst.max(largest_difference(&answer(&warm), &answer(&cold)));
+            worst = worst.max(largest_difference(&answer(run.law()), &answer(&cold)));
+        }
+    }
+    assert_at_most("force from the step before, difference", worst, 1e-10);
+}
+
+#[test]
+fn seed_rule_repeated_at_fixed_positions_ends_at_the_contact_law() {
+    let mut worst: f64 = 0.0;
+    let mut sweeps = 0;
+    for packing in packings() {
+        let expected = answer(&solved(&packing));
+        let mut seed = law(Rule::Seed, Method::ConjugateGradient);
+        seed.solve(&packing, &[], &[]).unwrap();
+        let mut repeats = 0;
+        while seed.residual() > seed.accepted_residual() {
+            seed.solve_again(&packing).unwrap();
+            repeats += 1;
+            assert!(repeats < 100, "no end after {repeats} repeats");
+        }
+        sweeps = sweeps.max(repeats);
+        worst = worst.max(largest_difference(&answer(&seed), &expected));
+    }
+    println!("at most {sweeps} repeats");
+    assert_at_most("force by the seed's rule, difference", worst, 1e-10);
+}
+
+/// The same contact problem on packings that are one and the same to physics: positions by `place`, particles by `name`.
+fn assert_invariant(
+    what: &str,
+    packing: &Packing,
+    domain: Domain,
+    place: impl Fn(Vec2) -> Vec2,
+    name: impl Fn(usize) -> usize,
+) {
+    let n = packing.len();
+    let (mut radii, mut positions) = (vec![0.0; n], vec![Vec2::zeros(); n]);
+    for p in 0..n {
+        radii[name(p)] = packing.radii()[p];
+        positions[name(p)] = place(packing.positions()[p]);
+    }
+    let image = Packing::new(domain, radii, positions).unwrap();
+    let mut expected: Vec<([u32; 2], f64)> = answer(&solved(packing))
+        .into_iter()
+        .map(|([i, j], f)| {
+            let (i, j) = (name(i as usize) as u32, name(j as usize) as u32);
+            ([i.min(j), i.max(j)], f)
+        })
+        .collect();
+    expected.sort_by_key(|c| c.0);
+    let worst = largest_difference(&answer(&solved(&image)), &expected);
+    assert_at_most(&format!("{what}: force, difference"), worst, 1e-11);
+}
+
+#[test]
+fn contact_problem_is_the_same_after_a_translation_across_the_box_edge() {
+    for packing in packings() {
+        let shift = packing
+            .domain()
+            .lengths()
+            .component_mul(&Vec2::new(0.37, 0.71));
+        assert_invariant(
+            "translation",
+            &packing,
+            packing.domain(),
+            |p| p + shift,
+            |k| k,
+        );
+    }
+}
+
+#[test]
+fn contact_problem_is_the_same_after_a_quarter_turn_and_a_reflection() {
+    for packing in packings() {
+        let sides = packing.domain().lengths();
+        let turned = Domain::new(sides.y, sides.x).unwrap();
+        assert_invariant(
+            "quarter turn",
+            &packing,
+            turned,
+            |p| Vec2::new(sides.y - p.y, p.x),
+            |k| k,
+        );
+        let mirror = |p: Vec2| Vec2::new(sides.x - p.x, p.y);
+        assert_invariant("reflection", &packing, packing.domain(), mirror, |k| k);
+    }
+}
+
+#[test]
+fn contact_problem_is_the_same_under_other_particle_numbers() {
+    let mut random = Random::new(4);
+    for packing in packings() {
+        let mut names: Vec<usize> = (0..packing.len()).collect();
+        random.shuffle(&mut names);
+        assert_invariant(
+            "relabelling",
+            &packing,
+            packing.domain(),
+            |p| p,
+            |k| names[k],
+        );
+    }
+}
+
+#[test]
+fn forces_scale_with_the_line_tension_and_not_with_the_unit_of_length() {
+    for packing in packings() {
+        let one = answer(&solved(&packing));
+        let sides = packing.domain().lengths() * 3.0;
+        let tripled = Packing::new(
+            Domain::new(sides.x, sides.y).unwrap(),
+            packing.radii().iter().map(|r| 3.0 * r).collect(),
+            packing.positions().iter().map(|p| p * 3.0).collect(),
+        )
+        .unwrap();
+        let difference = largest_difference(&answer(&solved(&tripled)), &one);
+        assert_at_most("unit of length: force, difference", difference, 1e-11);
+        let mut tense =
+            ContactLaw::new(Rule::Complementarity, Method::ConjugateGradient, 2.5, 1e-12);
+        tense.solve(&packing, &[], &[]).unwrap();
+        let scaled: Vec<_> = answer(&tense)
+            .into_iter()
+            .map(|(p, f)| (p, f / 2.5))
+            .collect();
+        assert_at_most(
+            "line tension: force, difference",
+            largest_difference(&scaled, &one),
+            1e-11,
+        );
+    }
+}
+
+/// Two particles at x = 0.5 and x = 8.0 of a box of the given side.
+fn two_across_the_edge(radius: f64, side: f64) -> Packing {
+    let centres = vec![Vec2::new(0.5, 4.0), Vec2::new(8.0, 4.0)];
+    Packing::new(Domain::new(side, 9.0).unwrap(), vec![radius; 2], centres).unwrap()
+}
+
+#[test]
+fn law_that_has_seen_other_radii_gives_the_answer_of_a_new_one() {
+    let mut law = solved(&two_across_the_edge(0.5, 9.0));
+    let grown = two_across_the_edge(0.8, 9.0);
+    law.solve(&grown, &[], &[]).unwrap();
+    assert_eq!(
+        answer(&law),
+        answer(&solved(&grown)),
+        "δ = 0.1 at the same centres"
+    );
+}
+
+#[test]
+fn law_that_has_seen_another_box_gives_the_answer_of_a_new_one() {
+    let mut law = solved(&two_across_the_edge(0.5, 9.0));
+    let narrowed = two_across_the_edge(0.5, 8.4);
+    law.solve(&narrowed, &[], &[]).unwrap();
+    assert_eq!(
+        answer(&law),
+        answer(&solved(&narrowed)),
+        "δ = 0.1 at the same centres"
+    );
+}

@@ -1,0 +1,181 @@
+//! Whole relaxations: how long they take, where they end, and that they can be taken up anywhere.
+
+use crate::common::{
+    answer, assert_at_most, assert_within, converged, largest_difference, median, monodisperse,
+    scene,
+};
+use softjam::contact::Rule;
+use softjam::contact::solver::Method;
+use softjam::disks::{self, DiskParameters};
+use softjam::frame::Frame;
+use softjam::relax::{Relaxation, Status};
+use softjam::scene::{Radii, Scene, Start, start};
+
+#[test]
+fn seed_rule_and_contact_law_end_in_the_same_packing() {
+    let mut worst: f64 = 0.0;
+    for particles in [64, 96, 128] {
+        for seed in 1..=4 {
+            let law = converged(&scene(particles, 0.9, seed));
+            let rule = converged(&Scene {
+                contact_rule: Rule::Seed,
+                ..scene(particles, 0.9, seed)
+            });
+            worst = worst.max(largest_difference(&answer(law.law()), &answer(rule.law())));
+        }
+    }
+    assert_at_most(
+        "force at the end by the other rule, difference",
+        worst,
+        1e-8,
+    );
+}
+
+#[test]
+fn undeformed_disks_have_the_coordination_of_harmonic_packings() {
+    // Z = 4 + 3.6 √(φ − 0.842); LAMMPS, one sample of the same size: 4.475 and 4.878. Samples scatter by about 0.02.
+    for phi in [0.86, 0.90] {
+        let seeds = 1..=8;
+        let mut sum = 0.0;
+        for seed in seeds.clone() {
+            let mut packing = start::packing(&scene(1024, phi, seed)).unwrap();
+            let report = disks::relax(&mut packing, &DiskParameters::default(), 1.0);
+            assert!(report.converged, "φ = {phi}, seed {seed}: {report:?}");
+            sum += report.coordination;
+        }
+        let (mean, expected) = (
+            sum / seeds.count() as f64,
+            4.0 + 3.6 * f64::sqrt(phi - 0.842),
+        );
+        assert_within(
+            &format!("phi {phi}: mean Z"),
+            mean,
+            expected - 0.03,
+            expected + 0.03,
+        );
+    }
+}
+
+#[test]
+fn disks_report_of_a_run_is_that_of_its_disks() {
+    let scene = scene(128, 0.86, 2);
+    let run = Relaxation::new(&scene).unwrap();
+    let mut packing = start::packing(&scene).unwrap();
+    let report = disks::relax(&mut packing, &scene.disks, scene.line_tension);
+    assert_eq!(run.disks(), Some(report));
+    assert_eq!(run.packing(), &packing);
+}
+
+#[test]
+fn largest_force_falls_below_the_threshold_and_later_near_jamming() {
+    let steps = |phi: f64| {
+        let runs = (1..=7).map(|seed| {
+            let mut run = Relaxation::new(&scene(256, phi, seed)).unwrap();
+            let first = run.f_max();
+            while run.status() == Status::Running {
+                run.advance().unwrap();
+            }
+            assert_eq!(run.status(), Status::Converged, "φ = {phi}, seed {seed}");
+            assert!(
+                run.f_max() <= 1e-10 && first > 1e-4,
+                "φ = {phi}, seed {seed}"
+            );
+            run.step()
+        });
+        let median = median(runs.collect());
+        println!("phi {phi}: median of the steps {median}");
+        median
+    };
+    let near = steps(0.843);
+    for phi in [0.86, 0.88, 0.90] {
+        assert!(
+            near as f64 > 1.5 * steps(phi) as f64,
+            "φ = {phi} against {near} steps at 0.843"
+        );
+    }
+}
+
+#[test]
+fn run_taken_up_at_any_frame_ends_in_the_same_bits() {
+    let scenes = [
+        scene(64, 0.90, 1),
+        scene(48, 0.843, 2),
+        Scene {
+            aspect: 0.7,
+            line_tension: 0.5,
+            radii: Radii::Spread { min: 0.4, max: 1.0 },
+            ..scene(60, 0.95, 3)
+        },
+    ];
+    for scene in scenes {
+        for contact_rule in [Rule::Complementarity, Rule::Seed] {
+            for contact_solver in [Method::ConjugateGradient, Method::SparseCholesky] {
+                let scene = Scene {
+                    contact_rule,
+                    contact_solver,
+                    ..scene.clone()
+                };
+                let packing = start::packing(&scene).unwrap();
+                let frames: Result<Vec<Frame>, _> = Relaxation::new(&scene).unwrap().collect();
+                let frames = frames.unwrap();
+                let last = frames.len() - 1;
+                for k in [0, 1, 2, 30, last / 3, last / 2, last - 1, last] {
+                    let resumed = Relaxation::resume(&scene, packing.clone(), frames[k].clone());
+                    let rest: Result<Vec<Frame>, _> = resumed.unwrap().collect();
+                    let rest = rest.unwrap();
+                    assert_eq!(
+                        rest.len(),
+                        frames.len() - k,
+                        "{contact_rule:?} from step {k}"
+                    );
+                    for (a, b) in rest.iter().zip(&frames[k..]) {
+                        assert_eq!(a.digest(), b.digest(), "{contact_rule:?} from step {k}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn same_scene_walks_the_same_bits() {
+    let scene = scene(100, 0.87, 9);
+    let (a, b) = (converged(&scene), converged(&scene));
+    assert_eq!(a.frame().digest(), b.frame().digest());
+}
+
+#[test]
+fn tightest_contact_tolerance_that_a_scene_may_ask_for_is_reached() {
+    for seed in 1..=3 {
+        for contact_solver in [Method::ConjugateGradient, Method::SparseCholesky] {
+            let run = converged(&Scene {
+                contact_tolerance: 1e-14,
+                contact_solver,
+                ..scene(100, 0.9, seed)
+            });
+            assert!(run.law().residual() <= 1.6e-13);
+        }
+    }
+}
+
+#[test]
+fn disturbed_crystal_of_equal_particles_relaxes_back() {
+    let crystal = Scene {
+        particles: 56,
+        phi: 0.93,
+        radii: monodisperse(),
+        start: Start::Hexagonal,
+        ..Scene::default()
+    };
+    let at_rest = Relaxation::new(&crystal).unwrap();
+    let mut frame = at_rest.frame();
+    frame.positions[20].x += 0.05;
+    frame.positions[31].y -= 0.03;
+    let mut run = Relaxation::resume(&crystal, at_rest.packing().clone(), frame).unwrap();
+    while run.status() == Status::Running {
+        run.advance().unwrap();
+    }
+    assert_eq!(run.status(), Status::Converged);
+    let worst = largest_difference(&answer(run.law()), &answer(at_rest.law()));
+    assert_at_most("force after the disturbance, difference", worst, 1e-8);
+}
