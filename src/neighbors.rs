@@ -26,7 +26,8 @@ use crate::packing::Packing;
 #[derive(Clone, Debug, Default)]
 pub struct NeighborList {
     pairs: Vec<[u32; 2]>,
-    reference: Vec<Vec2>,
+    /// The packing that the list was built for.
+    reference: Option<Packing>,
     reach: f64,
     builds: u64,
     cells: CellList,
@@ -82,8 +83,10 @@ impl NeighborList {
             return false;
         }
         self.reach = margin + skin;
-        self.reference.clear();
-        self.reference.extend_from_slice(packing.positions());
+        match &mut self.reference {
+            Some(reference) => reference.clone_from(packing),
+            none => *none = Some(packing.clone()),
+        }
         self.cells
             .pairs_within(packing, self.reach, &mut self.pairs);
         self.builds += 1;
@@ -91,15 +94,19 @@ impl NeighborList {
     }
 
     fn covers(&self, packing: &Packing, margin: f64) -> bool {
-        if self.reference.len() != packing.len() || margin > self.reach {
+        let domain = packing.domain();
+        let Some(reference) = &self.reference else {
+            return false;
+        };
+        let same = reference.domain() == domain && reference.radii() == packing.radii();
+        if !same || margin > self.reach {
             return false;
         }
         let spare = 0.5 * (self.reach - margin);
-        let domain = packing.domain();
         packing
             .positions()
             .iter()
-            .zip(&self.reference)
+            .zip(reference.positions())
             .all(|(p, q)| domain.minimum_image(p - q).norm_squared() <= spare * spare)
     }
 }

@@ -13,7 +13,7 @@ pub struct SceneFlags {
 
     /// Number of particles N.
     #[arg(long, short = 'N', value_name = "N", allow_negative_numbers = true, help_heading = PACKING)]
-    particles: Option<i64>,
+    particles: Option<i128>,
 
     /// Coverage φ of the undeformed disks, 0 < φ < 1.3.
     #[arg(long, value_name = "PHI", allow_negative_numbers = true, help_heading = PACKING)]
@@ -45,7 +45,7 @@ pub struct SceneFlags {
 
     /// End at this step in any case.
     #[arg(long, value_name = "STEPS", allow_negative_numbers = true, help_heading = RELAXATION)]
-    steps: Option<i64>,
+    steps: Option<i128>,
 
     /// Upper bound of the time step; by default from the largest frequency.
     #[arg(long, value_name = "DT", allow_negative_numbers = true, help_heading = RELAXATION)]

@@ -60,10 +60,22 @@ pub fn run() -> ExitCode {
         Ok(Verdict::Interrupted) => ExitCode::from(1),
         Err(error) => {
             // Nobody is left to tell if standard error is closed too.
-            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            let _ = writeln!(std::io::stderr(), "error: {}", message(&error));
             ExitCode::from(exit_code(&error))
         }
     }
+}
+
+/// The chain of causes, without those that the error before them has already quoted.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |text, cause| {
+        let cause = cause.to_string();
+        match text.as_str() {
+            "" => cause,
+            said if said.contains(cause.trim_end()) => text,
+            _ => format!("{text}: {cause}"),
+        }
+    })
 }
 
 /// 2 for a request that makes no sense, 1 for one that could not be met.

@@ -46,7 +46,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            // Asked twice: the user does not want to wait for the end of a step, or of the disks.
+            std::process::exit(1);
+        }
+    })?;
 
     let start = Instant::now();
     let mut run = Relaxation::new(&scene)?;
@@ -119,7 +124,7 @@ impl Bar {
     /// The bar follows the decades that f_max has still to fall.
     fn show(&self, run: &Relaxation, start: Instant) {
         let Some(bar) = &self.bar else { return };
-        if run.step() % 16 != 0 {
+        if !run.step().is_multiple_of(16) {
             return;
         }
         let decades = |x: f64| libm::log10(x.max(self.threshold) / self.threshold);

@@ -320,7 +320,7 @@ mod tests {
         };
         let tip = 0.5 + 0.5 / (4.0 * PI) * 0.3 * (g(0.0) + g(2.0));
         let polygon = squeezed(style, &[0.5, 2.5], 0.3);
-        let least = polygon.iter().map(|v| v.norm()).fold(1.0, f64::min);
+        let least = polygon.iter().map(Vec2::norm).fold(1.0, f64::min);
         assert!((least - tip).abs() < 1e-14);
     }
 

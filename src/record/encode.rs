@@ -127,14 +127,12 @@ impl<W: Write> Encoder<W> {
         self.written += self.buffer.len() as u64;
         if let LogMsg::ArrowMsg(store, arrow) = message {
             let batch = re_sorbet::ChunkBatch::try_from(&arrow.batch).map_err(io::Error::other)?;
-            let place = match self.manifests.iter().position(|(id, _)| id == store) {
-                Some(place) => place,
-                None => {
-                    let manifest = RrdManifestBuilder::default();
-                    self.manifests.push((store.clone(), manifest));
-                    self.manifests.len() - 1
-                }
-            };
+            let known = self.manifests.iter().position(|(id, _)| id == store);
+            let place = known.unwrap_or(self.manifests.len());
+            if known.is_none() {
+                let manifest = RrdManifestBuilder::default();
+                self.manifests.push((store.clone(), manifest));
+            }
             self.manifests[place]
                 .1
                 .append(&batch, span, transport.byte_size_uncompressed())

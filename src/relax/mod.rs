@@ -131,13 +131,12 @@ impl Relaxation {
         let mut law = scene.contact_law();
         law.solve(&packing, &[], &[])
             .map_err(|source| RelaxError::Contact { step: 0, source })?;
-        let dt_max = match scene.dt_max {
-            Some(dt_max) => dt_max,
-            None => {
-                let omega = frequency::largest_frequency(&packing, &mut law, 20)
-                    .map_err(|source| RelaxError::Contact { step: 0, source })?;
-                DT_MAX_PER_PERIOD / omega
-            }
+        let dt_max = if let Some(dt_max) = scene.dt_max {
+            dt_max
+        } else {
+            let omega = frequency::largest_frequency(&packing, &mut law, 20)
+                .map_err(|source| RelaxError::Contact { step: 0, source })?;
+            DT_MAX_TIMES_OMEGA / omega
         };
         let state = FireState::start(&scene.fire, dt_max);
         let velocities = vec![Vec2::zeros(); packing.len()];
@@ -419,5 +418,7 @@ impl Iterator for Relaxation {
     }
 }
 
-/// `dt_max = DT_MAX_PER_PERIOD / ω_max`; 2 is the limit of stability.
-const DT_MAX_PER_PERIOD: f64 = 1.0;
+/// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Measured at N = 256,
+/// φ = 0.86 and 0.90: 0.5 takes 1.1 to 1.5 times the steps of 1.0, 1.2 about as many, 1.3 up to three times and 1.4 up to
+/// six times as many.
+const DT_MAX_TIMES_OMEGA: f64 = 1.0;

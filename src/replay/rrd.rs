@@ -142,7 +142,7 @@ impl Recording {
             .is_ok_and(|manifests| !manifests.is_empty())
     }
 
-    fn damaged(&self, problem: impl ToString) -> ReadError {
+    fn damaged(&self, problem: &impl ToString) -> ReadError {
         ReadError::Damaged {
             path: self.path.clone(),
             problem: problem.to_string(),
@@ -158,7 +158,7 @@ impl Recording {
         if *store != self.header.store {
             return Ok(());
         }
-        let chunk = Chunk::from_arrow_msg(arrow).map_err(|e| self.damaged(e))?;
+        let chunk = Chunk::from_arrow_msg(arrow).map_err(|e| self.damaged(&e))?;
         let entity = chunk.entity_path().to_string();
         match entity.as_str() {
             "/state" => self.read_states(&chunk),
@@ -220,8 +220,8 @@ impl Recording {
             let minimizer = minimizers
                 .next()
                 .and_then(|values| FireState::from_values(&values))
-                .ok_or_else(|| self.damaged(format!("no minimiser state at step {step}")))?;
-            let missing = |what| self.damaged(format!("no {what} at step {step}"));
+                .ok_or_else(|| self.damaged(&format!("no minimiser state at step {step}")))?;
+            let missing = |what| self.damaged(&format!("no {what} at step {step}"));
             let frame = Frame {
                 step,
                 positions: positions.next().ok_or_else(|| missing("positions"))?,
@@ -268,7 +268,7 @@ impl Recording {
         let (Some(converged), Some(steps), Some(f_max), Some(digest)) =
             (converged, steps, f_max, digest)
         else {
-            return Err(self.damaged("its result is not whole"));
+            return Err(self.damaged(&"its result is not whole"));
         };
         self.events.push_back(Ok(Event::Result {
             outcome: Outcome {
@@ -296,7 +296,7 @@ impl Iterator for Recording {
             }
             let read = match self.messages.next()? {
                 Ok(message) => self.read(&message),
-                Err(error) => Err(self.damaged(error)),
+                Err(error) => Err(self.damaged(&error)),
             };
             if let Err(error) = read {
                 self.failed = true;

@@ -27,7 +27,7 @@ use crate::relax::fire::Fire;
     reason = "the fields are those of Scene, where they are documented"
 )]
 pub struct SceneFields {
-    pub particles: Option<i64>,
+    pub particles: Option<i128>,
     pub phi: Option<f64>,
     pub aspect: Option<f64>,
     pub species: Option<Vec<Species>>,
@@ -38,7 +38,7 @@ pub struct SceneFields {
     pub seed: Option<u64>,
     pub line_tension: Option<f64>,
     pub threshold: Option<f64>,
-    pub steps: Option<i64>,
+    pub steps: Option<i128>,
     pub minimizer: Option<Minimizer>,
     pub dt_max: Option<f64>,
     pub contact_rule: Option<Rule>,
@@ -169,6 +169,13 @@ impl SceneFields {
             with: format!("start = \"{kind}\""),
             why: why.into(),
         };
+        if let (Some(hash), None) = (&self.file_blake3, &self.file) {
+            return Err(conflict(
+                "file_blake3",
+                format!("\"{hash}\""),
+                "there is no start file that could have this hash",
+            ));
+        }
         match (kind, &self.file) {
             ("random" | "hexagonal", Some(file)) => Err(conflict(
                 "file",
@@ -227,7 +234,7 @@ impl SceneFields {
 }
 
 /// A whole number that may be missing; `least` is its lower bound.
-fn count(field: &str, value: Option<i64>, default: u64, least: u64) -> Result<u64, SceneError> {
+fn count(field: &str, value: Option<i128>, default: u64, least: u64) -> Result<u64, SceneError> {
     match value {
         None => Ok(default),
         Some(n) => u64::try_from(n)

@@ -64,11 +64,16 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
         }
     };
     let (l, largest_radius) = (packing.domain().lengths(), packing.largest_radius());
+    let (phi, aspect) = match scene.start {
+        Start::Random => (scene.phi, scene.aspect),
+        Start::Hexagonal => (scene.phi, l.x / l.y),
+        Start::File { .. } => (packing.coverage(), l.x / l.y),
+    };
     if packing.domain().shortest() < 5.0 * largest_radius {
         return Err(SceneError::BoxTooSmall {
             particles: packing.len(),
-            phi: packing.coverage(),
-            aspect: l.x / l.y,
+            phi,
+            aspect,
             length_x: l.x,
             length_y: l.y,
             largest_radius,
@@ -87,8 +92,7 @@ fn make(domain: Domain, radii: Vec<f64>, positions: Vec<Vec2>) -> Result<Packing
 
 fn domain(scene: &Scene, radii: &[f64], aspect: f64) -> Result<Domain, SceneError> {
     let area = radii.iter().map(|r| PI * r * r).sum::<f64>() / scene.phi;
-    let length_x = (area * aspect).sqrt();
-    Domain::new(length_x, area / length_x).ok_or_else(|| SceneError::Range {
+    Domain::new((area * aspect).sqrt(), (area / aspect).sqrt()).ok_or_else(|| SceneError::Range {
         field: "phi".into(),
         value: scene.phi.to_string(),
         allowed: "what gives a box of finite size".into(),
@@ -266,12 +270,9 @@ fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
         if name.trim() != "box" {
             continue;
         }
-        let sides: Vec<f64> = value
-            .split(',')
-            .filter_map(|side| side.trim().parse().ok())
-            .collect();
-        return match sides.as_slice() {
-            [x, y] => Domain::new(*x, *y),
+        let sides: Result<Vec<f64>, _> = value.split(',').map(|s| s.trim().parse()).collect();
+        return match sides.as_deref() {
+            Ok([x, y]) => Domain::new(*x, *y),
             _ => None,
         }
         .ok_or_else(|| {

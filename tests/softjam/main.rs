@@ -1,5 +1,21 @@
 //! Integration tests, one module a theme.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and prints what it measured"
+)]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the tests' own formulas use the standard library on purpose: nothing is shared with the crate"
+)]
+
 mod common;
 mod physics;
+#[cfg(feature = "cli")]
+mod program;
+#[cfg(feature = "rrd")]
+mod recording;
 mod scenes;

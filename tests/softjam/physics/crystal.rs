@@ -234,7 +234,7 @@ fn square_crystal_has_its_closed_form_forces() {
 }
 
 #[test]
-fn hexagonal_crystal_reproduces_the_published_table() {
+fn hexagonal_crystal_reproduces_the_table_of_the_model_error() {
     // φ, exact force, Morse–Witten force, error in per cent: the project's table of the model error.
     for (phi, exact, morse_witten, error) in [
         (0.908, 0.00688, 0.00682, -1.0),

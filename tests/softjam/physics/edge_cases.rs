@@ -7,7 +7,7 @@ use softjam::contact::{ContactError, ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
 use softjam::packing::Packing;
 use softjam::relax::{RelaxError, Relaxation, Status};
-use softjam::scene::{Scene, Start, start};
+use softjam::scene::{Radii, Scene, Start, start};
 
 const METHODS: [Method; 3] = [
     Method::ConjugateGradient,
@@ -167,6 +167,33 @@ fn seed_one_starts_where_chacha8_says() {
 }
 
 #[test]
+fn seed_one_draws_radii_before_centres_and_shuffles_the_radii_of_a_crystal() {
+    // The same stream of numbers, again in Python.
+    let spread = Scene {
+        radii: Radii::Spread { min: 0.4, max: 0.6 },
+        ..scene(12, 0.86, 1)
+    };
+    let start = start::packing(&spread).unwrap();
+    let radii = [0.4762978826476522, 0.458985465156335, 0.5596508494763192];
+    assert_eq!(start.radii()[..3], radii);
+    assert_eq!(
+        start.positions()[0],
+        at(1.1811191586712653, 2.5795518035553218)
+    );
+    assert_eq!(
+        start.positions()[11],
+        at(2.7798574990030405, 0.7438700802737316)
+    );
+    let crystal = Scene {
+        start: Start::Hexagonal,
+        ..scene(16, 0.86, 1)
+    };
+    // Fisher and Yates from the end, eight small particles followed by eight large ones.
+    let shuffled = [7, 5, 5, 7, 7, 5, 7, 5, 7, 5, 5, 7, 7, 7, 5, 5].map(|k| f64::from(k) / 10.0);
+    assert_eq!(start::packing(&crystal).unwrap().radii(), shuffled);
+}
+
+#[test]
 fn time_step_far_too_long_is_an_error_or_an_end_but_no_panic() {
     for dt_max in [3.0, 100.0, 1e6, 1e300] {
         let scene = Scene {
@@ -185,8 +212,35 @@ fn time_step_far_too_long_is_an_error_or_an_end_but_no_panic() {
                 Some(Err(other)) => panic!("{other}"),
             }
         };
-        println!("dt_max {dt_max}: {end} at step {}", run.step());
+        println!("dt_max {dt_max:e}: {end} at step {}", run.step());
         assert!(run.next().is_none(), "the iterator ends behind an error");
+    }
+}
+
+#[test]
+fn frame_with_impossible_forces_is_an_error_or_a_run_but_no_panic() {
+    let scene = Scene {
+        steps: 50,
+        ..scene(40, 0.9, 1)
+    };
+    let start = Relaxation::new(&scene).unwrap();
+    let all: Vec<[u32; 2]> = (0..40)
+        .flat_map(|i| (i + 1..40).map(move |j| [i, j]))
+        .collect();
+    for force in [1e300, -1e300, 1.0, -1.0, 0.0, -0.0] {
+        for rule in [Rule::Complementarity, Rule::Seed] {
+            let mut frame = start.frame();
+            frame.contacts = all.clone();
+            frame.forces = vec![force; all.len()];
+            let scene = Scene {
+                contact_rule: rule,
+                ..scene.clone()
+            };
+            let run = Relaxation::resume(&scene, start.packing().clone(), frame).unwrap();
+            for frame in run.flatten().skip(1) {
+                assert!(frame.validate(40, start.packing().domain()).is_ok());
+            }
+        }
     }
 }
 

@@ -247,8 +247,8 @@ impl Cholesky {
         for r in (0..l.n).rev() {
             x[r] /= l.at(r, r);
             let y = x[r];
-            for k in 0..r {
-                x[k] -= l.at(r, k) * y;
+            for (k, above) in x[..r].iter_mut().enumerate() {
+                *above -= l.at(r, k) * y;
             }
         }
         x

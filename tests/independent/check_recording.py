@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""Checks a softjam recording with nothing of softjam's: only rerun's reader, numpy and the formulas of the paper.
+
+For every recorded state (or every K-th, with --every K):
+  eq. (4)        max |A f - delta| relative to max |delta|, A assembled densely from the positions
+  contact law    f > 0 on contacts, gap >= 0 for all other pairs
+  balance        the largest net force, against the recorded f_max
+  pressure, U    from forces and distances, against the recorded metrics
+  contours       every vertex against rho_i(theta) at its own angle
+
+usage: check_recording.py RUN.rrd [--every K]      (pip install rerun-sdk==0.36.3 numpy)
+"""
+
+import argparse
+import sys
+
+import numpy as np
+import rerun.experimental as rerun
+
+
+def g(theta):
+    """The kernel of eq. (2), even and 2 pi periodic."""
+    t = np.mod(np.abs(theta), 2 * np.pi)
+    return (np.pi - t) * np.sin(t) - 0.5 * np.cos(t) - 1.0
+
+
+class Recording:
+    def __init__(self, path):
+        self.states, self.contours, self.metrics = {}, {}, {}
+        for chunk in rerun.RrdReader(path).stream().to_chunks():
+            batch = chunk.to_record_batch()
+            entity = str(chunk.entity_path)
+            if entity == "/particles":
+                self.radii = batch["softjam.Particles:radius"][0].values.to_numpy()
+                self.box = batch["softjam.Particles:box"][0].values.to_numpy()
+            elif entity == "/state":
+                for row in range(batch.num_rows):
+                    self.states[batch["step"][row].as_py()] = tuple(
+                        flat(batch["softjam.State:" + name][row])
+                        for name in ("position", "contact", "force")
+                    )
+            elif entity == "/world/contours" and not chunk.is_static:
+                strips = [n for n in batch.schema.names if n.endswith(":strips")][0]
+                for row in range(batch.num_rows):
+                    self.contours[batch["step"][row].as_py()] = batch[strips][row]
+            elif entity.startswith("/metrics/"):
+                values = self.metrics.setdefault(entity.removeprefix("/metrics/"), {})
+                for row in range(batch.num_rows):
+                    values[batch["step"][row].as_py()] = batch["Scalars:scalars"][row][0].as_py()
+
+
+def flat(cell):
+    """A list of numbers or of pairs as an array of shape (n,) or (n, 2)."""
+    values = cell.values
+    if hasattr(values, "flatten") and "fixed_size_list" in str(values.type):
+        return values.flatten().to_numpy().reshape(-1, 2)
+    return values.to_numpy()
+
+
+def nearest(d, box):
+    return d - box * np.rint(d / box)
+
+
+def check_state(recording, state, gamma):
+    """Residuals of one frame: eq. (4), least gap, least force, f_max, pressure, energy."""
+    positions, contacts, forces = state
+    radii, box = recording.radii, recording.box
+    n = len(radii)
+    i, j = contacts[:, 0].astype(int), contacts[:, 1].astype(int)
+    d = nearest(positions[i] - positions[j], box)
+    r = np.hypot(d[:, 0], d[:, 1])
+    normal = d / r[:, None]
+    delta = radii[i] + radii[j] - r
+    # Contacts of each particle: the angle towards the partner and the contact's number.
+    angle_i = np.arctan2(-normal[:, 1], -normal[:, 0])
+    angle_j = np.arctan2(normal[:, 1], normal[:, 0])
+    around = [[] for _ in range(n)]
+    for c in range(len(forces)):
+        around[i[c]].append((angle_i[c], c))
+        around[j[c]].append((angle_j[c], c))
+    matrix = np.zeros((len(forces), len(forces)))
+    for p in range(n):
+        for a, c in around[p]:
+            for b, k in around[p]:
+                matrix[c, k] -= radii[p] / (2 * np.pi * gamma) * g(a - b)
+    scale = np.abs(delta).max() if len(delta) else 1.0
+    residual = np.abs(matrix @ forces - delta).max() / scale if len(delta) else 0.0
+
+    def bulge(p, theta):
+        return radii[p] / (2 * np.pi * gamma) * sum(forces[c] * g(theta - a) for a, c in around[p])
+
+    touching = set(zip(i.tolist(), j.tolist()))
+    least_gap = np.inf
+    for p in range(n):
+        away = nearest(positions[p] - positions[p + 1 :], box)
+        distance = np.hypot(away[:, 0], away[:, 1])
+        # No bulge reaches 0.64 R/(2 pi gamma) times the sum of the forces; twice a radius is far beyond.
+        for k in np.flatnonzero(distance < 2 * (radii[p] + radii[p + 1 :])):
+            q = p + 1 + int(k)
+            if (p, q) not in touching:
+                theta = np.arctan2(-away[k, 1], -away[k, 0])
+                reach = radii[p] + bulge(p, theta) + radii[q] + bulge(q, theta + np.pi)
+                least_gap = min(least_gap, distance[k] - reach)
+    net = np.zeros((n, 2))
+    np.add.at(net, i, forces[:, None] * normal)
+    np.add.at(net, j, -forces[:, None] * normal)
+    return {
+        "eq4": residual,
+        "gap": least_gap / scale,
+        "force": forces.min() if len(forces) else np.inf,
+        "f_max": np.hypot(net[:, 0], net[:, 1]).max(),
+        "pressure": (forces * r).sum() / (2 * box.prod()),
+        "energy": 0.5 * (forces * delta).sum(),
+        "around": around,
+    }
+
+
+def check_contours(recording, state, around, strips, gamma):
+    """The largest distance of a vertex from rho at its own angle."""
+    positions, _, forces = state
+    radii = recording.radii
+    worst = 0.0
+    for p, strip in enumerate(strips.as_py()):
+        v = np.asarray(strip, dtype=float) - positions[p]
+        theta = np.arctan2(v[:, 1], v[:, 0])
+        rho = np.full(len(v), radii[p])
+        for a, c in around[p]:
+            rho += radii[p] / (2 * np.pi * gamma) * forces[c] * g(theta - a)
+        worst = max(worst, np.abs(np.hypot(v[:, 0], v[:, 1]) - rho).max())
+        if not np.array_equal(strip[0], strip[-1]):
+            sys.exit(f"contour {p} is not closed")
+    return worst
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("path")
+    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--line-tension", type=float, default=1.0)
+    arguments = parser.parse_args()
+    gamma = arguments.line_tension
+    recording = Recording(arguments.path)
+    steps = sorted(recording.states)
+    steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
+    worst = dict.fromkeys(("eq4", "gap", "force", "f_max", "pressure", "energy", "contour"), 0.0)
+    vertices = 0
+    for step in steps:
+        state = recording.states[step]
+        found = check_state(recording, state, gamma)
+        worst["eq4"] = max(worst["eq4"], found["eq4"])
+        worst["gap"] = max(worst["gap"], -found["gap"])
+        worst["force"] = max(worst["force"], -found["force"])
+        for name in ("f_max", "pressure", "energy"):
+            recorded = recording.metrics[name][step]
+            worst[name] = max(worst[name], abs(found[name] - recorded))
+        if step in recording.contours:
+            strips = recording.contours[step]
+            vertices += sum(len(s) for s in strips)
+            contour = check_contours(recording, state, found["around"], strips, gamma)
+            worst["contour"] = max(worst["contour"], contour)
+    # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
+    single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
+    limits = {
+        "eq4": (1e-9, "eq. (4), |A f - delta| / max |delta|"),
+        "gap": (1e-9, "overlap of pairs that are not contacts / max |delta|"),
+        "force": (0.0, "negative contact force"),
+        "f_max": (1e-9, "net force against the recorded f_max"),
+        "pressure": (1e-9, "pressure against the recorded one"),
+        "energy": (1e-9, "energy against the recorded one"),
+        "contour": (single, f"contour vertex off rho(theta), {vertices} vertices"),
+    }
+    last = steps[-1]
+    print(f"{arguments.path}: {len(steps)} states up to step {last}, recorded f_max = {recording.metrics['f_max'][last]:.3e}")
+    bad = 0
+    for name, (limit, text) in limits.items():
+        verdict = "ok" if worst[name] <= limit else "BAD"
+        bad += verdict != "ok"
+        print(f"  {verdict:3} {worst[name]:9.2e} (limit {limit:.1e})  {text}")
+    sys.exit(3 if bad else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,203 @@
+//! Recordings: what goes in comes out, damage is noticed, failures are reported where they happen.
+
+use softjam::frame::Frame;
+use softjam::record::{self, RrdRecorder, Snapshot, Writer};
+use softjam::relax::{Relaxation, Status};
+use softjam::replay::{Event, ReadError, Recording};
+use softjam::scene::{Channels, Scene, Schedule};
+use std::io::{self, Write};
+use std::path::Path;
+
+fn scene() -> Scene {
+    Scene {
+        particles: 48,
+        phi: 0.88,
+        channels: Channels {
+            state: Schedule::Every(7),
+            ..Channels::default()
+        },
+        ..Scene::default()
+    }
+}
+
+fn record_to(path: &Path, scene: &Scene) {
+    let mut run = Relaxation::new(scene).expect("a valid scene");
+    let writer = Writer::create(path, false, scene, run.packing()).expect("a file");
+    record::record(&mut run, writer, &scene.channels, |_| true).expect("recorded");
+}
+
+fn states(path: &Path) -> Vec<Frame> {
+    Recording::open(path)
+        .expect("a recording")
+        .filter_map(|event| match event.expect("undamaged") {
+            Event::State(frame) => Some(frame),
+            _ => None,
+        })
+        .collect()
+}
+
+#[test]
+fn recorded_frames_come_back_with_the_bits_they_went_in_with() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.rrd");
+    let scene = scene();
+    record_to(&path, &scene);
+    let mut run = Relaxation::new(&scene).expect("a valid scene");
+    let mut expected = Vec::new();
+    loop {
+        let last = run.status() != Status::Running;
+        if last || run.step().is_multiple_of(7) {
+            expected.push(run.frame());
+        }
+        if last {
+            break;
+        }
+        run.advance().expect("a step");
+    }
+    let found = states(&path);
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(&expected) {
+        assert_eq!(a.digest(), b.digest(), "step {}", b.step);
+    }
+}
+
+#[test]
+fn a_run_resumed_from_any_recorded_frame_ends_in_the_same_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.rrd");
+    let scene = scene();
+    record_to(&path, &scene);
+    let frames = states(&path);
+    let last = frames.last().expect("a last frame").digest();
+    let packing = Relaxation::new(&scene)
+        .expect("a valid scene")
+        .packing()
+        .clone();
+    for frame in frames.iter().step_by(frames.len() / 5) {
+        let run =
+            Relaxation::resume(&scene, packing.clone(), frame.clone()).expect("a frame of it");
+        let end = run.last().expect("a frame").expect("no failure");
+        assert_eq!(end.digest(), last, "resumed at step {}", frame.step);
+    }
+}
+
+#[test]
+fn the_result_names_the_digest_over_all_recorded_states() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.rrd");
+    record_to(&path, &scene());
+    let mut hash = blake3::Hasher::new();
+    for frame in states(&path) {
+        hash.update(&frame.digest());
+    }
+    let result = Recording::open(&path)
+        .expect("a recording")
+        .find_map(|event| match event.expect("undamaged") {
+            Event::Result { outcome, digest } => Some((outcome, digest)),
+            _ => None,
+        });
+    let (outcome, digest) = result.expect("a result");
+    assert!(outcome.converged && outcome.f_max <= 1e-10);
+    assert_eq!(digest, *hash.finalize().as_bytes());
+}
+
+#[test]
+fn a_changed_position_is_noticed_by_its_digest() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.rrd");
+    record_to(&path, &scene());
+    let frames = states(&path);
+    let target = &frames[frames.len() / 2];
+    let mut bytes = std::fs::read(&path).expect("bytes");
+    let needle = target.positions[10].x.to_le_bytes();
+    let place = bytes
+        .windows(8)
+        .position(|w| w == needle)
+        .expect("the position is in the file");
+    bytes[place] ^= 1;
+    std::fs::write(&path, &bytes).expect("written");
+    let error = Recording::open(&path)
+        .expect("the header is whole")
+        .find_map(Result::err)
+        .expect("the change is noticed");
+    match error {
+        ReadError::Digest { step, intact, .. } => {
+            assert_eq!(step, target.step);
+            assert_eq!(intact, Some(step - 7));
+        }
+        other => panic!("not the digest: {other}"),
+    }
+}
+
+#[test]
+fn other_files_are_told_apart_from_recordings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let open = |bytes: &[u8]| {
+        let path = folder.path().join("x.rrd");
+        std::fs::write(&path, bytes).expect("written");
+        Recording::open(&path).err().expect("refused").to_string()
+    };
+    assert!(open(b"").contains("is not a"));
+    assert!(open(b"# box = 1, 1\nx,y,radius\n").contains("is not a rerun recording"));
+    let path = folder.path().join("a.rrd");
+    record_to(&path, &scene());
+    let bytes = std::fs::read(&path).expect("bytes");
+    // Cut inside the blueprint: a rerun stream without a scene.
+    assert!(open(&bytes[..2000]).contains("not a softjam recording"));
+}
+
+/// A disk of limited size.
+struct SmallDisk {
+    left: usize,
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        let n = bytes.len().min(self.left);
+        self.left -= n;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_disk_that_fills_up_is_reported_at_once_wherever_it_happens() {
+    let scene = scene();
+    let start = Relaxation::new(&scene).expect("a valid scene");
+    let mut failures = 0;
+    for left in (0..3_000_000).step_by(299_993) {
+        let mut run = start.clone();
+        let recorder = RrdRecorder::new(SmallDisk { left }, scene.clone(), run.packing().clone());
+        let Ok(mut recorder) = recorder else {
+            failures += 1;
+            continue;
+        };
+        let result = loop {
+            let last = run.status() != Status::Running;
+            let snapshot = Snapshot::of(&run, &scene.channels, last);
+            if let Some(Err(error)) = snapshot.map(|s| recorder.record(&s)) {
+                break Err(error);
+            }
+            if last {
+                break recorder.finish(None).map(|_| ());
+            }
+            run.advance().expect("a step");
+        };
+        if let Err(error) = result {
+            failures += 1;
+            assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+            assert!(recorder.written() <= left as u64);
+            assert!(recorder.intact().is_none_or(|step| step <= run.step()));
+        }
+    }
+    assert!(
+        failures >= 5,
+        "only {failures} disks were too small: the test tests nothing"
+    );
+}
