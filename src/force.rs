@@ -154,6 +154,30 @@ impl Observables {
         o
     }
 
+    /// The metrics as they are recorded, by name: one scalar each under `/metrics/`.
+    ///
+    /// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
+    ///
+    /// ```
+    /// # use softjam::force::Observables;
+    /// let names = Observables::default().metrics().map(|(name, _)| name);
+    /// assert_eq!(names[..3], ["f_max", "log10_f_max", "energy"]);
+    /// ```
+    #[must_use]
+    pub fn metrics(&self) -> [(&'static str, f64); 9] {
+        [
+            ("f_max", self.f_max),
+            ("log10_f_max", libm::log10(self.f_max.max(1e-18))),
+            ("energy", self.energy),
+            ("pressure", self.pressure()),
+            ("coordination", self.coordination()),
+            ("contacts", self.contacts as f64),
+            ("rattlers", self.rattlers as f64),
+            ("dt", self.dt),
+            ("stress_xy", self.stress[1]),
+        ]
+    }
+
     /// Pressure `p = −tr σ/2 = (1/2V) Σ_c f_c r_c` (γ/length).
     ///
     /// ```

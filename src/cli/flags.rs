@@ -83,7 +83,7 @@ type ChannelList = Vec<(usize, Option<Schedule>)>;
 impl SceneFlags {
     /// The scene: defaults, overridden by the file, overridden by the flags.
     pub fn scene(&self) -> anyhow::Result<Scene> {
-        let file = match &self.scene {
+        self.scene_over(match &self.scene {
             None => SceneFields::default(),
             Some(path) => {
                 let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
@@ -93,7 +93,11 @@ impl SceneFlags {
                 SceneFields::from_toml(&text)
                     .with_context(|| format!("scene file {}", path.display()))?
             }
-        };
+        })
+    }
+
+    /// The scene of these fields, overridden by the flags.
+    pub fn scene_over(&self, file: SceneFields) -> anyhow::Result<Scene> {
         let channels = self.channels(file.channels.unwrap_or_default())?;
         let contours = self.vertices.map(|vertices| {
             let mut style = file.contours.unwrap_or_default();

@@ -5,6 +5,7 @@
 mod flags;
 mod info;
 mod record;
+mod replay;
 mod scene;
 
 use clap::{Parser, Subcommand};
@@ -16,10 +17,10 @@ use std::process::ExitCode;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done, and the verdict is good (converged)
+  0  done, and the verdict is good (converged; replay agrees)
   1  could not be done: I/O, a damaged file, a numerical failure, an interruption
   2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way
-  3  done, and the verdict is bad (not converged within the step limit)";
+  3  done, and the verdict is bad (not converged within the step limit; replay differs; forces out of balance)";
 
 /// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
 #[derive(Parser)]
@@ -33,6 +34,8 @@ struct Cli {
 enum Verb {
     /// Relax a scene and record it.
     Record(record::Arguments),
+    /// Check a recording: is it what its scene gives, bit for bit, and is it in force balance?
+    Replay(replay::Arguments),
     /// Say what a recording holds.
     Info(info::Arguments),
     /// Print a scene file: the default one, or a file and flags with every field filled in.
@@ -49,8 +52,16 @@ enum Verdict {
 
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
+    // A decoder's panic over a damaged file is told as an error; anything else is a fault of ours and speaks up.
+    let speak_up = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !softjam::replay::reading_damaged_bytes() {
+            speak_up(panic);
+        }
+    }));
     let result = match cli.verb {
         Verb::Record(arguments) => record::run(&arguments),
+        Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Scene(arguments) => scene::run(&arguments),
     };

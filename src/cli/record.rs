@@ -4,9 +4,12 @@ use super::flags::{RECORDING, SceneFlags};
 use super::{Verdict, print};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::force::Observables;
-use softjam::record::{self, Summary, Writer};
+use softjam::frame::Frame;
+use softjam::packing::Packing;
+use softjam::record::{self, Header, Summary, Writer};
 use softjam::relax::Relaxation;
-use softjam::scene::{Scene, SceneError};
+use softjam::replay::{Event, Recording};
+use softjam::scene::{Scene, SceneError, SceneFields};
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -20,10 +23,27 @@ Examples:
   softjam record                                    the default scene into softjam.rrd
   softjam record --particles 1024 --phi 0.9 --seed 7 -o run.rrd
   softjam record scene.toml --channels metrics,state -o small.rrd
+  softjam record --from broken.rrd -o rest.rrd      finish a run that was interrupted
 Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneFlags,
+
+    /// Go on from a recorded frame of an earlier run of the same scene, exactly as that run did or would have done.
+    #[arg(
+        long,
+        value_name = "RUN.rrd",
+        help_heading = "Continue",
+        conflicts_with_all = [
+            "scene", "particles", "phi", "aspect", "seed", "start", "file", "line_tension",
+            "dt_max", "contact_rule", "contact_solver",
+        ]
+    )]
+    from: Option<PathBuf>,
+
+    /// The recorded step to go on from; by default the last.
+    #[arg(long, value_name = "K", requires = "from", help_heading = "Continue")]
+    step: Option<u64>,
 
     /// File to record into.
     #[arg(long, short, value_name = "RUN.rrd", default_value = "softjam.rrd", help_heading = RECORDING)]
@@ -35,7 +55,11 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let scene = arguments.scene.scene()?.pinned()?;
+    let origin = match &arguments.from {
+        None => Origin::Scene(arguments.scene.scene()?.pinned()?),
+        Some(path) => recorded_frame(path, arguments)?,
+    };
+    let scene = origin.scene().clone();
     fits_in_memory(&scene)?;
     // Before minutes are spent on a packing that could not be written.
     if !arguments.force && arguments.output.exists() {
@@ -54,9 +78,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     })?;
 
     let start = Instant::now();
-    let mut run = Relaxation::new(&scene)?;
+    let mut run = match origin {
+        Origin::Scene(scene) => Relaxation::new(&scene)?,
+        Origin::Frame(scene, packing, frame) => Relaxation::resume(&scene, packing, *frame)?,
+    };
     let disks = start.elapsed();
-    let writer = Writer::create(&arguments.output, arguments.force, &scene, run.packing())?;
+    let writer = Writer::create(&arguments.output, arguments.force, Header::of(&scene, &run))?;
     let bar = Bar::new(&scene);
     let start = Instant::now();
     let recorded = record::record(&mut run, writer, &scene.channels, |run| {
@@ -77,6 +104,56 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         Some(outcome) if outcome.converged => Verdict::Good,
         Some(_) => Verdict::Bad,
     })
+}
+
+/// Where a run begins.
+enum Origin {
+    Scene(Scene),
+    Frame(Scene, Packing, Box<Frame>),
+}
+
+impl Origin {
+    fn scene(&self) -> &Scene {
+        match self {
+            Self::Scene(scene) | Self::Frame(scene, ..) => scene,
+        }
+    }
+}
+
+/// The frame to go on from, and its scene with what the flags change about its end and its recording.
+fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> {
+    let mut recording = Recording::open(path)?;
+    let fields = SceneFields::from_toml(&recording.scene().to_toml())?;
+    let scene = arguments.scene.scene_over(fields)?;
+    let mut found = None;
+    // Not consumed: the recording is asked for its packing afterwards.
+    for event in recording.by_ref() {
+        if let Event::State(frame) = event? {
+            let step = frame.step;
+            if arguments.step.is_none_or(|k| step <= k) {
+                found = Some(frame);
+            }
+            if arguments.step.is_some_and(|k| step >= k) {
+                break;
+            }
+        }
+    }
+    let last = found.as_ref().map(|frame| frame.step);
+    match found {
+        Some(frame) if arguments.step.is_none_or(|k| k == frame.step) => {
+            let packing = recording.packing(&frame)?;
+            Ok(Origin::Frame(scene, packing, Box::new(frame)))
+        }
+        _ => Err(SceneError::Range {
+            field: "step".to_owned(),
+            value: arguments.step.map_or("last".to_owned(), |k| k.to_string()),
+            allowed: match last {
+                Some(last) => format!("the recorded states; the nearest before it is {last}"),
+                None => "the recorded states, of which there is none before it".to_owned(),
+            },
+        }
+        .into()),
+    }
 }
 
 /// Refuses a scene that would bring the machine down instead of relaxing.

@@ -22,9 +22,9 @@ use super::Contacts;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
 use super::solver::{LinearSolver, Method, SolverError};
-use crate::droplet::kernel::{Direction, G_AT_CONTACT, G_MAX};
+use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::neighbors::NeighborList;
-use crate::packing::{Packing, unit_and_length};
+use crate::packing::Packing;
 use core::f64::consts::PI;
 
 /// How the contact list follows the positions.
@@ -492,17 +492,9 @@ impl ContactLaw {
                 continue;
             }
             self.work.gaps += 1;
-            let (normal, distance) = unit_and_length(separation);
-            let overlap = radii[i] + radii[j] - distance;
-            let to_j = Direction::of(-normal);
-            let gamma = self.line_tension;
-            let bulge_i = self
+            let gap = self
                 .geometry
-                .displacement(radii[i], gamma, i, to_j, &self.forces);
-            let bulge_j =
-                self.geometry
-                    .displacement(radii[j], gamma, j, to_j.opposite(), &self.forces);
-            let gap = -overlap - bulge_i - bulge_j;
+                .gap(packing, self.line_tension, &self.forces, i, j);
             if gap < -tolerance {
                 let compliance =
                     -G_AT_CONTACT * (radii[i] + radii[j]) / (2.0 * PI * self.line_tension);

@@ -136,25 +136,37 @@ impl Geometry {
         &self.toward[self.duplicate.entries(p)]
     }
 
-    /// `ΔR_p` in a direction, Saitoh (3): `(R_p / 2πγ) Σ_k f_pk g(θ − θ_k)` (length).
+    /// The gap between the deformed contours of particles `i < j` that are not in contact (length):
+    /// `r_ij − ρ_i(θ_j) − ρ_j(θ_i)`, which is `−Δ_ij` in Saitoh 2.2.4.
     ///
-    /// `forces` holds one entry a contact, in units of `γ`·(unit of `line_tension`).
-    #[must_use]
-    pub(crate) fn displacement(
+    /// `forces` has one entry a contact, `line_tension` is γ.
+    pub(crate) fn gap(
         &self,
-        radius: f64,
+        packing: &Packing,
         line_tension: f64,
-        p: usize,
-        direction: Direction,
         forces: &[f64],
+        i: usize,
+        j: usize,
     ) -> f64 {
+        let (normal, distance) = unit_and_length(packing.separation(i, j));
+        let overlap = packing.radii()[i] + packing.radii()[j] - distance;
+        let to_j = Direction::of(-normal);
+        let bulge = |p: usize, direction: Direction| {
+            let scale = packing.radii()[p] / (2.0 * PI * line_tension);
+            self.displacement(scale, p, direction, forces)
+        };
+        -overlap - bulge(i, to_j) - bulge(j, to_j.opposite())
+    }
+
+    /// `ΔR_p` in a direction, Saitoh (3): `scale Σ_k f_pk g(θ − θ_k)` with `scale = R_p / 2πγ`.
+    fn displacement(&self, scale: f64, p: usize, direction: Direction, forces: &[f64]) -> f64 {
         let sum: f64 = self
             .toward(p)
             .iter()
             .zip(self.duplicate.contacts(p))
             .map(|(d, &c)| forces[c as usize] * direction.g_between(*d))
             .sum();
-        radius / (2.0 * PI * line_tension) * sum
+        scale * sum
     }
 }
 

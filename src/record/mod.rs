@@ -10,7 +10,7 @@
 //! let path = std::env::temp_dir().join("softjam-record-example.rrd");
 //! let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 //! let mut run = Relaxation::new(&scene).unwrap();
-//! let writer = record::Writer::create(&path, true, &scene, run.packing()).unwrap();
+//! let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
 //! let summary = record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
 //! assert!(summary.bytes > 0);
 //! # std::fs::remove_file(&path).unwrap();
@@ -43,6 +43,39 @@ pub const FORMAT_VERSION: u32 = 1;
 /// assert!(softjam::record::PROGRAM.starts_with("softjam "));
 /// ```
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+
+/// What a recording says of itself before its first frame.
+///
+/// ```
+/// use softjam::{record::Header, relax::Relaxation, scene::Scene};
+///
+/// let scene = Scene { particles: 32, ..Scene::default() };
+/// let run = Relaxation::new(&scene).unwrap();
+/// assert_eq!(Header::of(&scene, &run).from_step, 0);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Header {
+    /// The scene, with every default.
+    pub scene: Scene,
+    /// Radii and box.
+    pub packing: Packing,
+    /// The step of the first frame; not 0 if the run goes on from another recording.
+    pub from_step: u64,
+}
+
+impl Header {
+    /// The header of a recording that begins with the present step of `run`.
+    ///
+    /// See the example of [`Header`].
+    #[must_use]
+    pub fn of(scene: &Scene, run: &Relaxation) -> Self {
+        Self {
+            scene: scene.clone(),
+            packing: run.packing().clone(),
+            from_step: run.step(),
+        }
+    }
+}
 
 /// What is recorded of one step.
 ///
@@ -212,11 +245,4 @@ pub fn record(
             return Err(error.into());
         }
     }
-}
-
-/// What a recording says of itself before its first frame.
-#[derive(Clone, Debug)]
-struct Header {
-    scene: Scene,
-    packing: Packing,
 }

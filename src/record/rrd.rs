@@ -2,7 +2,7 @@
 //!
 //! | entity | content |
 //! | --- | --- |
-//! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program` |
+//! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program`, `:from_step` |
 //! | `/world`, `/world/box` | y up; the periodic box |
 //! | `/world/contours` | particle polygons, coloured by the pressure on the particle |
 //! | `/world/contacts` | a segment a contact between the centres, width and colour by the force |
@@ -19,10 +19,8 @@ use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Snapshot, Written, bluepri
 use crate::contact::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
-use crate::force::Observables;
 use crate::frame::Frame;
 use crate::packing::Packing;
-use crate::scene::Scene;
 use core::f64::consts::PI;
 use rerun::external::arrow::array::{
     ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, ListArray, StringArray, UInt8Array,
@@ -39,37 +37,11 @@ use rerun::{
 use std::io::{self, Write};
 use std::sync::Arc;
 
-/// The entities of `/metrics`, in the order of [`metric_values`].
-const METRICS: [&str; 9] = [
-    "f_max",
-    "log10_f_max",
-    "energy",
-    "pressure",
-    "coordination",
-    "contacts",
-    "rattlers",
-    "dt",
-    "stress_xy",
-];
-
-fn metric_values(o: &Observables) -> [f64; METRICS.len()] {
-    [
-        o.f_max,
-        // The viewer has no logarithmic axis; the floor keeps a perfect balance on the plot.
-        libm::log10(o.f_max.max(1e-18)),
-        o.energy,
-        o.pressure(),
-        o.coordination(),
-        o.contacts as f64,
-        o.rattlers as f64,
-        o.dt,
-        o.stress[1],
-    ]
-}
-
-/// A batch is written when it holds this many bytes or steps.
+/// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
+/// is killed loses no more than a batch.
 const BATCH_BYTES: usize = 1 << 20;
-const BATCH_STEPS: usize = 512;
+const BATCH_SNAPSHOTS: usize = 512;
+const BATCH_SPAN: u64 = 2048;
 
 /// Writes snapshots as an `.rrd` stream.
 ///
@@ -78,13 +50,13 @@ const BATCH_STEPS: usize = 512;
 /// Two runs of one scene give the same bytes:
 ///
 /// ```
-/// use softjam::{record::{RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
+/// use softjam::{record::{Header, RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let record = || {
 ///     let mut run = Relaxation::new(&scene).unwrap();
 ///     let mut bytes = Vec::new();
-///     let mut recorder = RrdRecorder::new(&mut bytes, scene.clone(), run.packing().clone()).unwrap();
+///     let mut recorder = RrdRecorder::new(&mut bytes, Header::of(&scene, &run)).unwrap();
 ///     for _ in 0..20 {
 ///         if let Some(snapshot) = Snapshot::of(&run, &scene.channels, false) {
 ///             recorder.record(&snapshot).unwrap();
@@ -112,14 +84,20 @@ pub struct RrdRecorder<W> {
 /// Rows that wait to be written: the entity's place in [`Pending::rows`] and its data.
 #[derive(Default)]
 struct Pending {
-    metrics: Vec<(u64, i64, [f64; METRICS.len()])>,
+    metrics: Vec<MetricRow>,
     contours: Vec<Row<LineStrips2D>>,
     contacts: Vec<Row<LineStrips2D>>,
     states: Vec<Row<DynamicArchetype>>,
     bytes: usize,
-    steps: usize,
+    snapshots: usize,
+    first: Option<u64>,
     last: Option<u64>,
 }
+
+/// A step, its simulated time in nanoseconds and its metrics.
+type MetricRow = (u64, i64, Metrics);
+
+type Metrics = [(&'static str, f64); 9];
 
 struct Row<T> {
     time: TimePoint,
@@ -127,15 +105,14 @@ struct Row<T> {
 }
 
 impl<W: Write> RrdRecorder<W> {
-    /// Starts a recording of `scene` with the radii and the box of `packing`: blueprint, scene, box, radii.
+    /// Starts a recording: blueprint, scene, box, radii.
     ///
     /// # Errors
     ///
     /// Whatever `sink` fails with.
     ///
     /// See the example of [`RrdRecorder`].
-    pub fn new(sink: W, scene: Scene, packing: Packing) -> io::Result<Self> {
-        let header = Header { scene, packing };
+    pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let mut encoder = Encoder::new(sink)?;
         let id = blake3::Hash::from_bytes(header.scene.digest()).to_hex();
         let recording = &id.as_str()[..32];
@@ -168,8 +145,8 @@ impl<W: Write> RrdRecorder<W> {
         if let Some(o) = &snapshot.metrics {
             self.pending
                 .metrics
-                .push((snapshot.step, nanoseconds, metric_values(o)));
-            self.pending.bytes += 24 * METRICS.len();
+                .push((snapshot.step, nanoseconds, o.metrics()));
+            self.pending.bytes += size_of::<Metrics>();
         }
         if let Some(frame) = &snapshot.frame {
             let time = TimePoint::default()
@@ -177,9 +154,14 @@ impl<W: Write> RrdRecorder<W> {
                 .with(Timeline::new_duration("sim_time"), nanoseconds);
             self.record_frame(snapshot, frame, &time);
         }
-        self.pending.steps += 1;
-        self.pending.last = Some(snapshot.step);
-        if self.pending.bytes >= BATCH_BYTES || self.pending.steps >= BATCH_STEPS {
+        let pending = &mut self.pending;
+        pending.snapshots += 1;
+        pending.last = Some(snapshot.step);
+        let first = *pending.first.get_or_insert(snapshot.step);
+        if pending.bytes >= BATCH_BYTES
+            || pending.snapshots >= BATCH_SNAPSHOTS
+            || snapshot.step.saturating_sub(first) >= BATCH_SPAN
+        {
             self.flush()?;
         }
         Ok(())
@@ -253,17 +235,16 @@ impl<W: Write> RrdRecorder<W> {
     }
 
     /// Metrics column by column: a row is too little data to be built by itself.
-    fn write_metrics(&mut self, rows: &[(u64, i64, [f64; METRICS.len()])]) -> io::Result<()> {
-        if rows.is_empty() {
-            return Ok(());
-        }
-        for (k, name) in METRICS.iter().enumerate() {
+    fn write_metrics(&mut self, rows: &[MetricRow]) -> io::Result<()> {
+        let names = rows.first().map(|row| row.2.map(|(name, _)| name));
+        for (k, name) in names.into_iter().flatten().enumerate() {
             let timelines = [
                 TimeColumn::new_sequence("step", rows.iter().map(|r| r.0 as i64)),
                 TimeColumn::new_duration_nanos("sim_time", rows.iter().map(|r| r.1)),
             ];
-            let values: ArrayRef =
-                Arc::new(Float64Array::from_iter_values(rows.iter().map(|r| r.2[k])));
+            let values: ArrayRef = Arc::new(Float64Array::from_iter_values(
+                rows.iter().map(|r| r.2[k].1),
+            ));
             let item = Arc::new(Field::new("item", DataType::Float64, true));
             let lengths = core::iter::repeat_n(1, rows.len());
             let list = ListArray::new(item, OffsetBuffer::from_lengths(lengths), values, None);
@@ -289,11 +270,11 @@ impl<W: Write> RrdRecorder<W> {
     /// The last step that the sink holds in full.
     ///
     /// ```
-    /// use softjam::{record::RrdRecorder, relax::Relaxation, scene::Scene};
+    /// use softjam::{record::{Header, RrdRecorder}, relax::Relaxation, scene::Scene};
     ///
     /// let scene = Scene { particles: 32, ..Scene::default() };
-    /// let packing = Relaxation::new(&scene).unwrap().packing().clone();
-    /// let recorder = RrdRecorder::new(Vec::new(), scene, packing).unwrap();
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// let recorder = RrdRecorder::new(Vec::new(), Header::of(&scene, &run)).unwrap();
     /// assert_eq!(recorder.intact(), None);
     /// ```
     #[must_use]
@@ -304,10 +285,10 @@ impl<W: Write> RrdRecorder<W> {
     /// Bytes of the whole messages written so far.
     ///
     /// ```
-    /// # use softjam::{record::RrdRecorder, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record::{Header, RrdRecorder}, relax::Relaxation, scene::Scene};
     /// # let scene = Scene { particles: 32, ..Scene::default() };
-    /// # let packing = Relaxation::new(&scene).unwrap().packing().clone();
-    /// # let recorder = RrdRecorder::new(Vec::new(), scene, packing).unwrap();
+    /// # let run = Relaxation::new(&scene).unwrap();
+    /// # let recorder = RrdRecorder::new(Vec::new(), Header::of(&scene, &run)).unwrap();
     /// assert!(recorder.written() > 0);
     /// ```
     #[must_use]
@@ -378,7 +359,11 @@ fn write_header<W: Write>(
             "format_version",
             array(UInt32Array::from(vec![FORMAT_VERSION])),
         )
-        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])));
+        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])))
+        .with_component_from_data(
+            "from_step",
+            array(UInt64Array::from(vec![header.from_step])),
+        );
     let particles = DynamicArchetype::new("softjam.Particles")
         .with_component_from_data(
             "radius",

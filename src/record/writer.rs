@@ -1,8 +1,6 @@
 //! The thread that encodes and writes, behind a bounded queue.
 
 use super::{Header, Outcome, RecordError, RrdRecorder, Snapshot};
-use crate::packing::Packing;
-use crate::scene::Scene;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
@@ -58,18 +56,17 @@ impl Writer {
     /// [`RecordError::Exists`] or [`RecordError::Create`].
     ///
     /// ```
-    /// use softjam::{record::Writer, relax::Relaxation, scene::Scene};
+    /// use softjam::{record::{Header, Writer}, relax::Relaxation, scene::Scene};
     ///
     /// let scene = Scene { particles: 32, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();
-    /// let error = Writer::create("/nowhere/run.rrd", false, &scene, run.packing()).unwrap_err();
+    /// let error = Writer::create("/nowhere/run.rrd", false, Header::of(&scene, &run)).unwrap_err();
     /// assert!(error.to_string().starts_with("cannot create /nowhere/run.rrd"));
     /// ```
     pub fn create(
         path: impl AsRef<Path>,
         replace: bool,
-        scene: &Scene,
-        packing: &Packing,
+        header: Header,
     ) -> Result<Self, RecordError> {
         let path = path.as_ref();
         let name = path.display().to_string();
@@ -87,10 +84,6 @@ impl Writer {
                 source,
             },
         })?;
-        let header = Header {
-            scene: scene.clone(),
-            packing: packing.clone(),
-        };
         let (queue, messages) = sync_channel(QUEUE);
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())
@@ -179,7 +172,7 @@ fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Wri
         source,
     };
     let cut = file.try_clone().map_err(start)?;
-    let mut recorder = RrdRecorder::new(file, header.scene, header.packing).map_err(start)?;
+    let mut recorder = RrdRecorder::new(file, header).map_err(start)?;
     let mut outcome = None;
     let mut result = Ok(());
     while result.is_ok() {

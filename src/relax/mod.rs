@@ -128,6 +128,26 @@ impl Relaxation {
         let disks = scene
             .starts_from_disks()
             .then(|| disks::relax(&mut packing, &scene.disks, scene.line_tension));
+        let run = Self::of_packing(scene, packing)?;
+        Ok(Self { disks, ..run })
+    }
+
+    /// Frame 0 of a run of `scene` that starts from `packing` as it stands, whatever start the scene names.
+    ///
+    /// # Errors
+    ///
+    /// [`RelaxError::Scene`] for an invalid scene, [`RelaxError::Contact`] if the contact problem cannot be solved.
+    ///
+    /// ```
+    /// use softjam::{relax::Relaxation, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// let same = Relaxation::of_packing(&scene, run.packing().clone()).unwrap();
+    /// assert_eq!(run.frame().digest(), same.frame().digest());
+    /// ```
+    pub fn of_packing(scene: &Scene, packing: Packing) -> Result<Self, RelaxError> {
+        scene.validate()?;
         let mut law = scene.contact_law();
         law.solve(&packing, &[], &[])
             .map_err(|source| RelaxError::Contact { step: 0, source })?;
@@ -151,7 +171,7 @@ impl Relaxation {
             threshold: scene.threshold,
             step_limit: scene.steps,
             f_max: 0.0,
-            disks,
+            disks: None,
             yielded: false,
         };
         run.balance();

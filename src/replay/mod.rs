@@ -1,11 +1,26 @@
-//! Reading recordings back.
+//! Replay: a recording proves itself.
 //!
 //! [`Recording`] streams a file: its scene and radii first, then what was recorded, in the order of the file. Memory
 //! does not grow with the file. A frame comes out with the bits it went in with, and its digest is checked on the way.
+//!
+//! Two questions are put to it. [`determinism`]: is the trajectory what the scene gives, bit for bit? And [`Balance`]: do
+//! its frames fulfil the contact law and, at the end, balance of forces, from positions and radii alone? [`compare`] holds
+//! two recordings against each other.
 
-mod rrd;
+mod balance;
+mod compare;
+mod determinism;
+mod difference;
+mod header;
+mod recording;
+mod stream;
 
-pub use rrd::Recording;
+pub use balance::{Balance, Worst};
+pub use compare::{Comparison, compare};
+pub use determinism::{Determinism, ReplayError, Way, determinism};
+pub use difference::{Difference, What, ulps};
+pub use recording::Recording;
+pub use stream::reading_damaged_bytes;
 
 use crate::frame::{Frame, FrameError};
 use crate::record::Outcome;
@@ -102,6 +117,34 @@ pub enum ReadError {
         /// What is wrong.
         problem: String,
         /// The last recorded state before the damage.
+        intact: Option<u64>,
+    },
+    /// The file holds more than one recording.
+    #[error("{path} holds several recordings, one behind the other; {}", intact_up_to(*intact))]
+    Several {
+        /// Path of the file.
+        path: String,
+        /// The last recorded state of the first.
+        intact: Option<u64>,
+    },
+    /// States are missing or out of order.
+    #[error("{path}: {problem}; {}", intact_up_to(*intact))]
+    Steps {
+        /// Path of the file.
+        path: String,
+        /// What is wrong with the order.
+        problem: String,
+        /// The last recorded state before it.
+        intact: Option<u64>,
+    },
+    /// The recorded result does not belong to the recorded states.
+    #[error("{path}: the result is wrong: {problem}; {}", intact_up_to(*intact))]
+    Result {
+        /// Path of the file.
+        path: String,
+        /// What is wrong.
+        problem: String,
+        /// The last recorded state.
         intact: Option<u64>,
     },
     /// A frame is not one that a run can give.

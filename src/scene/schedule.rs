@@ -47,6 +47,30 @@ impl Schedule {
         }
     }
 
+    /// The first step of the schedule behind `step`; `None` if there is none.
+    ///
+    /// ```
+    /// use softjam::scene::Schedule;
+    /// assert_eq!(Schedule::Every(10).after(20), Some(30));
+    /// assert_eq!(Schedule::Log(2).after(10), Some(32));
+    /// assert_eq!(Schedule::Off.after(10), None);
+    /// ```
+    #[must_use]
+    pub fn after(self, step: u64) -> Option<u64> {
+        match self {
+            Self::Off => None,
+            Self::Every(k) => (step / k.max(1)).checked_add(1)?.checked_mul(k.max(1)),
+            Self::Log(per_decade) => {
+                // From just below the next mark; a step so large that marks are no whole steps has no successor.
+                let n = f64::from(per_decade);
+                let mark = libm::floor(n * libm::log10(step.max(1) as f64) + 1e-9);
+                let next = libm::exp10((mark + 1.0) / n) as u64;
+                let from = step.checked_add(1)?.max(next.saturating_sub(2));
+                (from..from.saturating_add(1000)).find(|s| self.includes(*s))
+            }
+        }
+    }
+
     /// Whether anything is recorded at all.
     ///
     /// ```
@@ -155,5 +179,29 @@ impl Channels {
             ("metrics", self.metrics),
             ("state", self.state),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_after_another_is_the_next_that_the_schedule_includes() {
+        let schedules = [1, 2, 7, 20, 100, 1000].map(Schedule::Log);
+        for schedule in schedules.into_iter().chain([1, 3, 10].map(Schedule::Every)) {
+            let steps: Vec<u64> = (0..20_000).filter(|s| schedule.includes(*s)).collect();
+            for pair in steps.windows(2) {
+                for step in [pair[0], pair[1] - 1] {
+                    assert_eq!(
+                        schedule.after(step),
+                        Some(pair[1]),
+                        "{schedule}, step {step}"
+                    );
+                }
+            }
+        }
+        assert_eq!(Schedule::Log(20).after(u64::MAX - 1), None);
+        assert_eq!(Schedule::Every(3).after(u64::MAX - 1), None);
     }
 }

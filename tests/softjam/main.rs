@@ -18,4 +18,6 @@ mod physics;
 mod program;
 #[cfg(feature = "rrd")]
 mod recording;
+#[cfg(feature = "rrd")]
+mod replay;
 mod scenes;

@@ -1,7 +1,7 @@
 //! Recordings: what goes in comes out, damage is noticed, failures are reported where they happen.
 
 use softjam::frame::Frame;
-use softjam::record::{self, RrdRecorder, Snapshot, Writer};
+use softjam::record::{self, Header, RrdRecorder, Snapshot, Writer};
 use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::{Channels, Scene, Schedule};
@@ -22,7 +22,7 @@ fn scene() -> Scene {
 
 fn record_to(path: &Path, scene: &Scene) {
     let mut run = Relaxation::new(scene).expect("a valid scene");
-    let writer = Writer::create(path, false, scene, run.packing()).expect("a file");
+    let writer = Writer::create(path, false, Header::of(scene, &run)).expect("a file");
     record::record(&mut run, writer, &scene.channels, |_| true).expect("recorded");
 }
 
@@ -173,7 +173,7 @@ fn a_disk_that_fills_up_is_reported_at_once_wherever_it_happens() {
     let mut failures = 0;
     for left in (0..3_000_000).step_by(299_993) {
         let mut run = start.clone();
-        let recorder = RrdRecorder::new(SmallDisk { left }, scene.clone(), run.packing().clone());
+        let recorder = RrdRecorder::new(SmallDisk { left }, Header::of(&scene, &run));
         let Ok(mut recorder) = recorder else {
             failures += 1;
             continue;

@@ -35,7 +35,7 @@ pub struct SparseCholesky {
 struct Symbolic {
     pointers: Vec<u32>,
     rows: Vec<u32>,
-    factorization: std::rc::Rc<SymbolicCholesky<u32>>,
+    factorization: std::sync::Arc<SymbolicCholesky<u32>>,
 }
 
 impl SparseCholesky {
@@ -74,7 +74,7 @@ impl SparseCholesky {
             None => Symbolic {
                 pointers: self.pointers.clone(),
                 rows: self.rows.clone(),
-                factorization: std::rc::Rc::new(
+                factorization: std::sync::Arc::new(
                     factorize_symbolic_cholesky(
                         pattern,
                         Side::Lower,
@@ -88,7 +88,7 @@ impl SparseCholesky {
                 ),
             },
         };
-        let factorization = std::rc::Rc::clone(&symbolic.factorization);
+        let factorization = std::sync::Arc::clone(&symbolic.factorization);
         self.symbolic = Some(symbolic);
         self.factor.clear();
         self.factor.resize(factorization.len_val(), 0.0);

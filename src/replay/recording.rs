@@ -1,19 +1,19 @@
-//! Reading `.rrd` files.
+//! A recording, read event by event.
 
+use super::header::Header;
+use super::stream::{Ending, Message, Stream, guarded};
 use super::{Event, ReadError};
 use crate::domain::{Domain, Vec2};
 use crate::frame::Frame;
-use crate::packing::coverage;
-use crate::record::{FORMAT_VERSION, Outcome};
+use crate::packing::{Packing, coverage};
+use crate::record::Outcome;
 use crate::relax::fire::FireState;
-use crate::scene::Scene;
-use rerun::external::re_log_encoding::rrd::{DecoderApp, DecoderIterator};
-use rerun::external::re_log_types::{LogMsg, StoreId, StoreKind};
+use crate::scene::{Scene, Schedule};
 use rerun::log::Chunk;
 use rerun::{Scalars, TimelineName};
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// A recording that is being read: an iterator of what it holds behind its header.
@@ -26,7 +26,7 @@ use std::path::Path;
 /// let path = std::env::temp_dir().join("softjam-recording-example.rrd");
 /// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
-/// let writer = record::Writer::create(&path, true, &scene, run.packing()).unwrap();
+/// let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
 /// record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
 ///
 /// let recording = Recording::open(&path).unwrap();
@@ -40,23 +40,14 @@ use std::path::Path;
 /// ```
 pub struct Recording {
     path: String,
-    messages: Messages,
+    stream: Stream,
     header: Header,
     /// What has been read and not yet handed out; an error is the last of it.
     events: VecDeque<Result<Event, ReadError>>,
-    intact: Option<u64>,
-    failed: bool,
-}
-
-type Messages = DecoderIterator<LogMsg, BufReader<File>>;
-
-/// What a recording says of itself before its first frame.
-struct Header {
-    store: StoreId,
-    scene: Scene,
-    radii: Vec<f64>,
-    domain: Domain,
-    program: String,
+    steps: Steps,
+    digests: blake3::Hasher,
+    outcome: Option<Outcome>,
+    ended: bool,
 }
 
 impl Recording {
@@ -72,23 +63,54 @@ impl Recording {
     /// ```
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let name = path.as_ref().display().to_string();
-        let file = File::open(path.as_ref()).map_err(|source| ReadError::Open {
+        let open = |path: &Path| {
+            let file = File::open(path)?;
+            let length = file.metadata()?.len();
+            Ok((file, length))
+        };
+        let (file, length) = open(path.as_ref()).map_err(|source| ReadError::Open {
             path: name.clone(),
             source,
         })?;
-        let mut messages =
-            DecoderApp::decode_eager(BufReader::new(file)).map_err(|e| ReadError::NotRrd {
-                path: name.clone(),
-                problem: e.to_string(),
+        Self::read(&name, BufReader::new(file), length)
+    }
+
+    /// Reads a recording of `length` bytes from any source; errors call it `name`.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] says what is wrong with it.
+    ///
+    /// ```
+    /// let error = softjam::replay::Recording::read("nothing", &[][..], 0).err().unwrap();
+    /// assert_eq!(error.to_string(), "nothing is not a rerun recording: the file is empty");
+    /// ```
+    pub fn read(
+        name: &str,
+        source: impl Read + Send + 'static,
+        length: u64,
+    ) -> Result<Self, ReadError> {
+        let path = name.to_owned();
+        let mut stream =
+            Stream::open(Box::new(source), length).map_err(|problem| ReadError::NotRrd {
+                path: path.clone(),
+                problem,
             })?;
-        let header = read_header(&name, &mut messages)?;
+        let header = Header::read(name, &mut stream)?;
         Ok(Self {
-            path: name,
-            messages,
+            path,
+            stream,
+            steps: Steps {
+                schedule: header.scene.channels.state,
+                first: header.from_step,
+                last: None,
+                off_schedule: false,
+            },
             header,
             events: VecDeque::new(),
-            intact: None,
-            failed: false,
+            digests: blake3::Hasher::new(),
+            outcome: None,
+            ended: false,
         })
     }
 
@@ -132,33 +154,82 @@ impl Recording {
         &self.header.program
     }
 
-    /// Whether the file was closed by its writer: a footer follows the last message. Known when the end is reached.
+    /// The step that the recording begins with; not 0 if its run went on from another recording.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn from_step(&self) -> u64 {
+        self.header.from_step
+    }
+
+    /// The name of the file.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether the file was closed by its writer; if not, it breaks off. Known when the end is reached.
     ///
     /// See the example of [`Recording`].
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.messages
-            .rrd_manifests()
-            .is_ok_and(|manifests| !manifests.is_empty())
+        self.stream.ending() == Some(Ending::Closed)
     }
 
-    fn damaged(&self, problem: &impl ToString) -> ReadError {
+    /// The last step whose state has been read in full.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn intact(&self) -> Option<u64> {
+        self.steps.last
+    }
+
+    /// The packing at a recorded frame.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError::Damaged`] if the frame is not one of this recording.
+    ///
+    /// See the example of [`Recording`].
+    pub fn packing(&self, frame: &Frame) -> Result<Packing, ReadError> {
+        let radii = self.header.radii.clone();
+        Packing::new(self.header.domain, radii, frame.positions.clone())
+            .map_err(|error| self.damaged(error.to_string()))
+    }
+
+    /// How the run ended, as far as it has been read.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn outcome(&self) -> Option<Outcome> {
+        self.outcome
+    }
+
+    fn damaged(&self, problem: impl Into<String>) -> ReadError {
         ReadError::Damaged {
             path: self.path.clone(),
-            problem: problem.to_string(),
-            intact: self.intact,
+            problem: problem.into(),
+            intact: self.steps.last,
         }
     }
 
     /// Takes a message apart into events.
-    fn read(&mut self, message: &LogMsg) -> Result<(), ReadError> {
-        let LogMsg::ArrowMsg(store, arrow) = message else {
-            return Ok(());
+    fn take_apart(&mut self, message: Message) -> Result<(), ReadError> {
+        let (store, chunk) = match message {
+            Message::Opens => {
+                return Err(ReadError::Several {
+                    path: self.path.clone(),
+                    intact: self.steps.last,
+                });
+            }
+            Message::Layout => return Ok(()),
+            Message::Chunk(store, chunk) => (store, chunk),
         };
-        if *store != self.header.store {
-            return Ok(());
+        if store != self.header.store {
+            return Err(self.damaged(format!("rows of another recording, {store:?}")));
         }
-        let chunk = Chunk::from_arrow_msg(arrow).map_err(|e| self.damaged(&e))?;
         let entity = chunk.entity_path().to_string();
         match entity.as_str() {
             "/state" => self.read_states(&chunk),
@@ -217,11 +288,11 @@ impl Recording {
             .iter_slices::<u8>("softjam.State:digest".into())
             .map(<[u8]>::to_vec);
         for step in steps {
+            let missing = |what| self.damaged(format!("no {what} at step {step}"));
             let minimizer = minimizers
                 .next()
                 .and_then(|values| FireState::from_values(&values))
-                .ok_or_else(|| self.damaged(&format!("no minimiser state at step {step}")))?;
-            let missing = |what| self.damaged(&format!("no {what} at step {step}"));
+                .ok_or_else(|| missing("minimiser state"))?;
             let frame = Frame {
                 step,
                 positions: positions.next().ok_or_else(|| missing("positions"))?,
@@ -235,7 +306,7 @@ impl Recording {
                 return Err(ReadError::Digest {
                     path: self.path.clone(),
                     step,
-                    intact: self.intact,
+                    intact: self.steps.last,
                 });
             }
             frame
@@ -244,9 +315,17 @@ impl Recording {
                     path: self.path.clone(),
                     step,
                     source,
-                    intact: self.intact,
+                    intact: self.steps.last,
                 })?;
-            self.intact = Some(step);
+            self.steps
+                .accept(step)
+                .map_err(|problem| ReadError::Steps {
+                    path: self.path.clone(),
+                    problem,
+                    intact: self.steps.last,
+                })?;
+            self.steps.last = Some(step);
+            self.digests.update(&digest);
             self.events.push_back(Ok(Event::State(frame)));
         }
         Ok(())
@@ -268,16 +347,30 @@ impl Recording {
         let (Some(converged), Some(steps), Some(f_max), Some(digest)) =
             (converged, steps, f_max, digest)
         else {
-            return Err(self.damaged(&"its result is not whole"));
+            return Err(self.damaged("its result is not whole"));
         };
-        self.events.push_back(Ok(Event::Result {
-            outcome: Outcome {
-                converged,
-                steps,
-                f_max,
-            },
-            digest,
-        }));
+        let outcome = Outcome {
+            converged,
+            steps,
+            f_max,
+        };
+        let wrong = |problem: String| ReadError::Result {
+            path: self.path.clone(),
+            problem,
+            intact: self.steps.last,
+        };
+        if digest != self.digests.finalize().as_bytes().as_slice() {
+            return Err(wrong(
+                "its digest is not that of the states before it".to_owned(),
+            ));
+        }
+        if self.steps.last.is_some_and(|last| last != steps) {
+            return Err(wrong(format!("it names {steps} steps")));
+        }
+        if self.outcome.replace(outcome).is_some() {
+            return Err(wrong("it is there twice".to_owned()));
+        }
+        self.events.push_back(Ok(Event::Result { outcome, digest }));
         Ok(())
     }
 }
@@ -291,96 +384,65 @@ impl Iterator for Recording {
             if let Some(event) = self.events.pop_front() {
                 return Some(event);
             }
-            if self.failed {
+            if self.ended {
                 return None;
             }
-            let read = match self.messages.next()? {
-                Ok(message) => self.read(&message),
-                Err(error) => Err(self.damaged(&error)),
+            let read = match self.stream.next() {
+                Ok(Some(message)) => {
+                    let mut read = Ok(());
+                    let decoded = guarded(|| {
+                        read = self.take_apart(message);
+                        Ok(())
+                    });
+                    decoded.map_err(|problem| self.damaged(problem)).and(read)
+                }
+                Ok(None) => {
+                    self.ended = true;
+                    Ok(())
+                }
+                Err(problem) => Err(self.damaged(problem)),
             };
             if let Err(error) = read {
-                self.failed = true;
+                self.ended = true;
                 self.events.push_back(Err(error));
             }
         }
     }
 }
 
-/// Reads messages until scene and radii are known.
-fn read_header(path: &str, messages: &mut Messages) -> Result<Header, ReadError> {
-    let missing = |missing| ReadError::NotSoftjam {
-        path: path.to_owned(),
-        missing,
-    };
-    let (mut scene, mut program) = (None, String::new());
-    for message in messages {
-        let message = message.map_err(|e| ReadError::NotRrd {
-            path: path.to_owned(),
-            problem: e.to_string(),
-        })?;
-        let LogMsg::ArrowMsg(store, arrow) = &message else {
-            continue;
+/// The order of the recorded states: what the schedule asks for, and one last frame that need not be on it.
+struct Steps {
+    schedule: Schedule,
+    first: u64,
+    last: Option<u64>,
+    off_schedule: bool,
+}
+
+impl Steps {
+    /// Whether `step` may come next.
+    fn accept(&mut self, step: u64) -> Result<(), String> {
+        let Some(last) = self.last else {
+            return if step == self.first {
+                Ok(())
+            } else {
+                Err(format!(
+                    "the first state is that of step {step}, not {}",
+                    self.first
+                ))
+            };
         };
-        if store.kind() != StoreKind::Recording {
-            continue;
+        if self.off_schedule || step <= last {
+            return Err(format!("step {step} follows step {last}"));
         }
-        let chunk = Chunk::from_arrow_msg(arrow).map_err(|e| ReadError::NotRrd {
-            path: path.to_owned(),
-            problem: e.to_string(),
-        })?;
-        match chunk.entity_path().to_string().as_str() {
-            "/scene" => {
-                let text = |name: &'static str| {
-                    let mut texts = chunk.iter_slices::<String>(name.into());
-                    texts
-                        .next()
-                        .and_then(|list| list.first().map(ToString::to_string))
-                };
-                let mut versions = chunk.iter_slices::<u32>("softjam.Scene:format_version".into());
-                if let Some(&[found]) = versions.next()
-                    && found > FORMAT_VERSION
-                {
-                    return Err(ReadError::Newer {
-                        path: path.to_owned(),
-                        found,
-                        known: FORMAT_VERSION,
-                    });
-                }
-                if let Some(toml) = text("softjam.Scene:toml") {
-                    scene = Some(Scene::from_toml(&toml).map_err(|source| ReadError::Scene {
-                        path: path.to_owned(),
-                        source,
-                    })?);
-                    program = text("softjam.Scene:program").unwrap_or_default();
-                }
-            }
-            "/particles" => {
-                let list = |name: &'static str| {
-                    let mut lists = chunk.iter_slices::<f64>(name.into());
-                    lists.next().map(<[f64]>::to_vec)
-                };
-                let radii = list("softjam.Particles:radius").ok_or(missing("radii"))?;
-                let sides = list("softjam.Particles:box").ok_or(missing("box"))?;
-                let domain = match sides.as_slice() {
-                    &[x, y] => Domain::new(x, y),
-                    _ => None,
-                };
-                let domain = domain.ok_or(missing("box of two positive sides"))?;
-                if radii.iter().any(|r| !(r.is_finite() && *r > 0.0)) {
-                    return Err(missing("radii that are positive and finite"));
-                }
-                return Ok(Header {
-                    store: store.clone(),
-                    scene: scene.ok_or(missing("scene"))?,
-                    radii,
-                    domain,
-                    program,
-                });
-            }
-            _ => {}
+        let expected = self.schedule.after(last);
+        if expected.is_some_and(|expected| step > expected) {
+            return Err(format!(
+                "the states between step {last} and step {step} are missing"
+            ));
         }
+        self.off_schedule = expected != Some(step);
+        Ok(())
     }
-    Err(missing(if scene.is_some() { "radii" } else { "scene" }))
 }
 
 fn steps(chunk: &Chunk) -> impl Iterator<Item = u64> + '_ {

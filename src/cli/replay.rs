@@ -1,0 +1,323 @@
+//! `softjam replay`: lets a recording prove itself.
+
+use super::{Verdict, print};
+use clap::ValueEnum;
+use softjam::frame::Frame;
+use softjam::packing::Packing;
+use softjam::record::Outcome;
+use softjam::replay::{
+    Balance, Comparison, Determinism, Event, Recording, ReplayError, Way, Worst, compare,
+    determinism,
+};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::sync_channel;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  softjam replay run.rrd                       both questions, by one run from the scene
+  softjam replay run.rrd --segments            the same verdict, on all cores
+  softjam replay run.rrd --only balance        forces and contacts alone, without running again
+  softjam replay run.rrd --against other.rrd   two recordings, frame by frame")]
+pub struct Arguments {
+    /// The recording.
+    #[arg(value_name = "RUN.rrd")]
+    file: PathBuf,
+
+    /// Ask one question only.
+    #[arg(long, value_name = "QUESTION")]
+    only: Option<Question>,
+
+    /// Run from each recorded frame to the next, in parallel, instead of from the scene to the end.
+    #[arg(long)]
+    segments: bool,
+
+    /// Threads for --segments; by default one a core. The verdict does not depend on it.
+    #[arg(long, value_name = "N", requires = "segments", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+
+    /// Compare with another recording instead.
+    #[arg(long, value_name = "OTHER.rrd", conflicts_with_all = ["only", "segments"])]
+    against: Option<PathBuf>,
+
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What can be asked of a recording.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Question {
+    /// Is the trajectory what the scene gives, bit for bit?
+    Determinism,
+    /// Do the frames fulfil the contact law, and does the last one balance?
+    Balance,
+}
+
+/// What was found out.
+struct Findings {
+    determinism: Option<Determinism>,
+    balance: Option<Balance>,
+    result: Option<Outcome>,
+    closed: bool,
+    last: Option<u64>,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    if let Some(other) = &arguments.against {
+        return against(&arguments.file, other, arguments.json);
+    }
+    let found = examine(arguments)?;
+    let good = found.good();
+    print(&if arguments.json {
+        found.json(&arguments.file)
+    } else {
+        found.text(&arguments.file)
+    })?;
+    Ok(if !good {
+        Verdict::Bad
+    } else if found.closed {
+        Verdict::Good
+    } else {
+        Verdict::Interrupted
+    })
+}
+
+fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
+    let mut recording = Recording::open(&arguments.file)?;
+    let wanted = |question| arguments.only.is_none_or(|only| only == question);
+    let balance = wanted(Question::Balance).then(|| Balance::new(recording.scene()));
+    let way = if arguments.segments {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Way::Segments(arguments.threads.map_or(cores, usize::from))
+    } else {
+        Way::Whole
+    };
+    // Frames are judged on a thread of their own while the run goes on.
+    let (queue, frames) = sync_channel::<(Packing, Frame)>(FRAMES_WAITING);
+    let (found, balance) = std::thread::scope(|scope| {
+        let judge = scope.spawn(move || {
+            balance.map(|mut balance| {
+                for (packing, frame) in frames {
+                    balance.check(&packing, &frame);
+                }
+                balance
+            })
+        });
+        let post = move |packing: &Packing, frame: &Frame| {
+            if wanted(Question::Balance) {
+                // The judge hangs up only by panicking, which is passed on below.
+                let _ = queue.send((packing.clone(), frame.clone()));
+            }
+        };
+        let found = if wanted(Question::Determinism) {
+            determinism(&mut recording, way, post).map(Some)
+        } else {
+            read_through(&mut recording, post).map(|()| None)
+        };
+        let balance = judge
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (found, balance)
+    });
+    let found = found?;
+    let states = balance.as_ref().map_or(0, |b| b.frames) + found.as_ref().map_or(0, |d| d.states);
+    if states == 0 {
+        let path = arguments.file.display().to_string();
+        return Err(ReplayError::NoState { path });
+    }
+    Ok(Findings {
+        determinism: found,
+        balance,
+        result: recording.outcome(),
+        closed: recording.is_closed(),
+        last: recording.intact(),
+    })
+}
+
+/// Frames that may wait for the judge before the run does.
+const FRAMES_WAITING: usize = 8;
+
+/// Reads a recording to its end.
+fn read_through(
+    recording: &mut Recording,
+    mut watch: impl FnMut(&Packing, &Frame),
+) -> Result<(), ReplayError> {
+    while let Some(event) = recording.next() {
+        if let Event::State(frame) = event? {
+            watch(&recording.packing(&frame)?, &frame);
+        }
+    }
+    Ok(())
+}
+
+impl Findings {
+    fn good(&self) -> bool {
+        let same = self
+            .determinism
+            .as_ref()
+            .is_none_or(|d| d.difference.is_none());
+        let balanced = self
+            .balance
+            .as_ref()
+            .is_none_or(|b| b.agrees() && self.result.is_none_or(|end| b.bears_out(&end)));
+        same && balanced
+    }
+
+    /// What the file lacks, if it lacks something.
+    fn lacks(&self) -> Option<String> {
+        let last = self.last.unwrap_or(0);
+        match (self.result, self.closed) {
+            (Some(_), true) => None,
+            (None, true) => Some(format!("the run was interrupted behind step {last}")),
+            (Some(_), false) => Some("the file breaks off behind its result: no footer".to_owned()),
+            (None, false) => Some(format!("the file breaks off behind step {last}: no result")),
+        }
+    }
+
+    fn text(&self, path: &Path) -> String {
+        let mut text = String::new();
+        let mut line = |name: &str, value: String| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{name:<14} {value}");
+        };
+        line("file", path.display().to_string());
+        if let Some(d) = &self.determinism {
+            let (first, last) = d.steps.unwrap_or_default();
+            line(
+                "determinism",
+                match &d.difference {
+                    None => format!(
+                        "{} states and {} metrics, steps {first} … {last}: the same to the last bit",
+                        d.states, d.metrics
+                    ),
+                    Some(difference) => format!("differs: {difference} (here: the file)"),
+                },
+            );
+        }
+        if let Some(b) = &self.balance {
+            let at = |w: &Worst| format!("{:.1e} (step {})", w.value, w.step);
+            line(
+                "equation (4)",
+                format!("{} of the largest overlap", at(&b.equation_4)),
+            );
+            line(
+                "gaps",
+                format!("deepest overlap elsewhere {}", at(&b.overlap)),
+            );
+            line(
+                "forces",
+                format!(
+                    "against those found anew {} of the largest force",
+                    at(&b.forces)
+                ),
+            );
+            if b.pull.value > 0.0 {
+                line("pulls", at(&b.pull));
+            }
+            if b.contacts.value > 0.0 {
+                let (n, step) = (b.contacts.value, b.contacts.step);
+                line(
+                    "contacts",
+                    format!("{n} pairs on one side only (step {step})"),
+                );
+            }
+            if let Some((step, error)) = &b.failed {
+                line("contact law", format!("step {step}: {error}"));
+            }
+            if let Some((step, f_max)) = b.last {
+                line(
+                    "f_max",
+                    format!("{f_max:.3e} γ at step {step}, from positions alone"),
+                );
+            }
+        }
+        if let Some(end) = self.result {
+            let word = if end.converged {
+                "converged"
+            } else {
+                "not converged"
+            };
+            line(
+                "result",
+                format!("{word}, {} steps, f_max = {:.3e} γ", end.steps, end.f_max),
+            );
+        }
+        if let Some(lacks) = self.lacks() {
+            line("unfinished", lacks);
+        }
+        let verdict = match (self.good(), self.lacks()) {
+            (true, None) => "verified",
+            (true, Some(_)) => "verified as far as it goes",
+            (false, _) => "NOT VERIFIED",
+        };
+        line("verdict", verdict.to_owned());
+        text
+    }
+
+    fn json(&self, path: &Path) -> String {
+        let worst = |w: &Worst| serde_json::json!({ "value": w.value, "step": w.step });
+        let determinism = self.determinism.as_ref().map(|d| {
+            serde_json::json!({
+                "states": d.states,
+                "metrics": d.metrics,
+                "first": d.steps.map(|s| s.0),
+                "last": d.steps.map(|s| s.1),
+                "difference": d.difference.as_ref().map(ToString::to_string),
+                "difference_step": d.difference.as_ref().map(|d| d.step),
+            })
+        });
+        let balance = self.balance.as_ref().map(|b| {
+            serde_json::json!({
+                "frames": b.frames,
+                "equation_4": worst(&b.equation_4),
+                "overlap": worst(&b.overlap),
+                "pull": worst(&b.pull),
+                "forces": worst(&b.forces),
+                "contacts": worst(&b.contacts),
+                "f_max": b.last.map(|l| l.1),
+                "failed": b.failed.as_ref().map(|(step, e)| format!("step {step}: {e}")),
+            })
+        });
+        let value = serde_json::json!({
+            "file": path.display().to_string(),
+            "determinism": determinism,
+            "balance": balance,
+            "converged": self.result.map(|r| r.converged),
+            "unfinished": self.lacks(),
+            "verified": self.good(),
+        });
+        format!("{value:#}\n")
+    }
+}
+
+fn against(here: &Path, there: &Path, json: bool) -> anyhow::Result<Verdict> {
+    let (mut a, mut b) = (Recording::open(here)?, Recording::open(there)?);
+    let found: Comparison = compare(&mut a, &mut b)?;
+    let same = found.difference.is_none() && found.common > 0;
+    let difference = found.difference.as_ref().map(ToString::to_string);
+    print(&if json {
+        let value = serde_json::json!({
+            "here": here.display().to_string(),
+            "there": there.display().to_string(),
+            "common": found.common,
+            "only_here": found.only_here,
+            "only_there": found.only_there,
+            "difference": difference,
+            "same": same,
+        });
+        format!("{value:#}\n")
+    } else {
+        let verdict = match difference {
+            Some(difference) => format!("differ: {difference}"),
+            None if found.common == 0 => "no step is recorded in both".to_owned(),
+            None => "the same to the last bit".to_owned(),
+        };
+        format!(
+            "common steps   {}\nonly here      {}\nonly there     {}\nverdict        {verdict}\n",
+            found.common, found.only_here, found.only_there
+        )
+    })?;
+    Ok(if same { Verdict::Good } else { Verdict::Bad })
+}

@@ -1,0 +1,171 @@
+//! Where two frames differ, told as a physicist would ask: which particle, by how much.
+
+use crate::domain::Vec2;
+use crate::frame::Frame;
+use core::fmt;
+
+/// The first difference between a recorded frame and the one it is held against.
+///
+/// # Example
+///
+/// ```
+/// use softjam::{frame::Frame, replay::Difference};
+///
+/// let (a, mut b) = (Frame { forces: vec![0.5], ..Frame::default() }, Frame::default());
+/// b.forces = vec![0.5_f64.next_up()];
+/// let difference = Difference::between(&a, &b).unwrap();
+/// assert_eq!(difference.to_string(), "step 0: force of contact 0: 0.5 here, 0.5000000000000001 there (1 ulp)");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The step.
+    pub step: u64,
+    /// What differs.
+    pub what: What,
+}
+
+/// What differs.
+///
+/// ```
+/// use softjam::replay::What;
+/// assert_ne!(What::Step(4), What::Step(3));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum What {
+    /// A number.
+    Value {
+        /// Its name, such as `x of particle 7`.
+        name: String,
+        /// What was recorded.
+        here: f64,
+        /// What it is held against.
+        there: f64,
+    },
+    /// The number of a list's entries.
+    Count {
+        /// What is counted.
+        name: &'static str,
+        /// What was recorded.
+        here: usize,
+        /// What it is held against.
+        there: usize,
+    },
+    /// A contact.
+    Contact {
+        /// Its number.
+        contact: usize,
+        /// The recorded pair.
+        here: [u32; 2],
+        /// The pair it is held against.
+        there: [u32; 2],
+    },
+    /// The other side has another step.
+    Step(u64),
+}
+
+impl Difference {
+    /// The first difference between a recorded frame and another, `None` if all their bits agree.
+    ///
+    /// Compared in this order: step, positions, velocities, contacts, forces, minimiser.
+    ///
+    /// See the example of [`Difference`].
+    #[must_use]
+    pub fn between(recorded: &Frame, other: &Frame) -> Option<Self> {
+        let step = recorded.step;
+        what(recorded, other).map(|what| Self { step, what })
+    }
+}
+
+fn what(a: &Frame, b: &Frame) -> Option<What> {
+    if a.step != b.step {
+        return Some(What::Step(b.step));
+    }
+    vectors(("x", "y"), &a.positions, &b.positions)
+        .or_else(|| vectors(("v_x", "v_y"), &a.velocities, &b.velocities))
+        .or_else(|| count("contacts", a.contacts.len(), b.contacts.len()))
+        .or_else(|| {
+            let pairs = a.contacts.iter().zip(&b.contacts);
+            let (contact, (here, there)) = pairs.enumerate().find(|(_, (p, q))| p != q)?;
+            Some(What::Contact {
+                contact,
+                here: *here,
+                there: *there,
+            })
+        })
+        .or_else(|| count("forces", a.forces.len(), b.forces.len()))
+        .or_else(|| numbers(&a.forces, &b.forces, |c| format!("force of contact {c}")))
+        .or_else(|| {
+            let names = ["dt", "dt_max", "alpha", "downhill", "moves", "time"];
+            numbers(&a.minimizer.values(), &b.minimizer.values(), |k| {
+                format!("{} of the minimiser", names[k])
+            })
+        })
+}
+
+pub(super) fn count(name: &'static str, here: usize, there: usize) -> Option<What> {
+    (here != there).then_some(What::Count { name, here, there })
+}
+
+pub(super) fn numbers(a: &[f64], b: &[f64], name: impl Fn(usize) -> String) -> Option<What> {
+    let mut pairs = a.iter().zip(b).enumerate();
+    let (k, (here, there)) = pairs.find(|(_, (x, y))| x.to_bits() != y.to_bits())?;
+    Some(What::Value {
+        name: name(k),
+        here: *here,
+        there: *there,
+    })
+}
+
+fn vectors(names: (&str, &str), a: &[Vec2], b: &[Vec2]) -> Option<What> {
+    count("particles", a.len(), b.len()).or_else(|| {
+        let flat = |v: &[Vec2]| v.iter().flat_map(|p| [p.x, p.y]).collect::<Vec<f64>>();
+        numbers(&flat(a), &flat(b), |k| {
+            let name = if k % 2 == 0 { names.0 } else { names.1 };
+            format!("{name} of particle {}", k / 2)
+        })
+    })
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "step {}: ", self.step)?;
+        match &self.what {
+            What::Value { name, here, there } => {
+                let distance = ulps(*here, *there);
+                let unit = if distance == 1 { "ulp" } else { "ulps" };
+                write!(
+                    f,
+                    "{name}: {here:?} here, {there:?} there ({distance} {unit})"
+                )
+            }
+            What::Count { name, here, there } => {
+                write!(f, "{here} {name} here, {there} there")
+            }
+            What::Contact {
+                contact,
+                here,
+                there,
+            } => write!(f, "contact {contact} is {here:?} here, {there:?} there"),
+            What::Step(there) => write!(f, "step {there} there"),
+        }
+    }
+}
+
+/// Units in the last place between two numbers: how many floating-point numbers apart they are.
+///
+/// ```
+/// use softjam::replay::ulps;
+/// assert_eq!(ulps(1.0, 1.0_f64.next_up()), 1);
+/// assert_eq!(ulps(-0.0, 0.0), 0);
+/// assert_eq!(ulps(-f64::MIN_POSITIVE, f64::MIN_POSITIVE), 2 << 52);
+/// ```
+#[must_use]
+pub fn ulps(a: f64, b: f64) -> u64 {
+    // The bits of an f64, read as a number with its sign, ascend with the value.
+    let place = |x: f64| {
+        let bits = x.to_bits() as i64;
+        if bits < 0 { i64::MIN - bits } else { bits }
+    };
+    place(a).abs_diff(place(b))
+}

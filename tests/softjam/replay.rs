@@ -1,0 +1,471 @@
+//! Replay: a recording proves itself, and nothing that is done to it passes in silence.
+
+use crate::common::Random;
+use softjam::frame::Frame;
+use softjam::record::{Header, RrdRecorder, Snapshot};
+use softjam::relax::{Relaxation, Status};
+use softjam::replay::{
+    Balance, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
+};
+use softjam::scene::{Channels, Scene, Schedule};
+use std::io::Cursor;
+
+fn scene() -> Scene {
+    Scene {
+        particles: 48,
+        phi: 0.88,
+        channels: Channels {
+            contours: Schedule::Every(100),
+            contacts: Schedule::Every(100),
+            metrics: Schedule::Every(1),
+            state: Schedule::Every(20),
+        },
+        ..Scene::default()
+    }
+}
+
+/// A whole recording of `scene` in memory, tampered with on the way by `change`.
+fn record(scene: &Scene, mut change: impl FnMut(&mut Snapshot)) -> Vec<u8> {
+    let mut run = Relaxation::new(scene).expect("a valid scene");
+    let mut bytes = Vec::new();
+    let mut recorder = RrdRecorder::new(&mut bytes, Header::of(scene, &run)).expect("a header");
+    loop {
+        let last = run.status() != Status::Running;
+        if let Some(mut snapshot) = Snapshot::of(&run, &scene.channels, last) {
+            change(&mut snapshot);
+            recorder.record(&snapshot).expect("recorded");
+        }
+        if last {
+            let outcome = softjam::record::Outcome {
+                converged: run.status() == Status::Converged,
+                steps: run.step(),
+                f_max: run.f_max(),
+            };
+            recorder.finish(Some(outcome)).expect("closed");
+            drop(recorder);
+            return bytes;
+        }
+        run.advance().expect("a step");
+    }
+}
+
+fn open(bytes: &[u8]) -> Result<Recording, ReadError> {
+    let length = bytes.len() as u64;
+    Recording::read("test", Cursor::new(bytes.to_vec()), length)
+}
+
+fn replay(bytes: &[u8], way: Way) -> Result<Determinism, ReplayError> {
+    determinism(&mut open(bytes)?, way, |_, _| {})
+}
+
+fn states(bytes: &[u8]) -> Vec<Frame> {
+    open(bytes)
+        .expect("a recording")
+        .filter_map(|event| match event.expect("undamaged") {
+            Event::State(frame) => Some(frame),
+            _ => None,
+        })
+        .collect()
+}
+
+const WAYS: [Way; 3] = [Way::Whole, Way::Segments(1), Way::Segments(3)];
+
+#[test]
+fn a_fresh_recording_is_what_its_scene_gives_whichever_way_it_is_run() {
+    let bytes = record(&scene(), |_| {});
+    let verdicts = WAYS.map(|way| replay(&bytes, way).expect("a verdict"));
+    assert_eq!(verdicts[0].difference, None);
+    let last = states(&bytes).last().expect("a state").step;
+    assert_eq!(verdicts[0].steps, Some((0, last)));
+    assert_eq!(verdicts[0].metrics, 9 * (last + 1));
+    assert_eq!(verdicts[0], verdicts[1]);
+    assert_eq!(verdicts[0], verdicts[2]);
+}
+
+#[test]
+fn a_frame_that_the_run_did_not_give_is_found_and_named() {
+    // The last bit of one coordinate, recorded with a digest that fits it: only a replay can tell.
+    let forged = record(&scene(), |snapshot| {
+        if let Some(frame) = &mut snapshot.frame
+            && frame.step == 60
+        {
+            frame.positions[7].y = frame.positions[7].y.next_up();
+        }
+    });
+    for way in WAYS {
+        let verdict = replay(&forged, way).expect("a verdict");
+        let difference = verdict
+            .difference
+            .expect("the forgery is found")
+            .to_string();
+        assert!(
+            difference.starts_with("step 60: y of particle 7") && difference.ends_with("(1 ulp)"),
+            "{way:?}: {difference}"
+        );
+    }
+}
+
+#[test]
+fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
+    let forgeries: [(&str, fn(&mut Snapshot)); 4] = [
+        ("metric pressure", |s| {
+            if let Some(o) = &mut s.metrics
+                && s.step == 33
+            {
+                o.stress[0] *= 1.0 + 1e-15;
+            }
+        }),
+        ("force of contact 5", |s| {
+            if let Some(frame) = s.frame.as_mut().filter(|f| f.step == 40) {
+                frame.forces[5] = frame.forces[5].next_down();
+            }
+        }),
+        ("alpha of the minimiser", |s| {
+            if let Some(frame) = s.frame.as_mut().filter(|f| f.step == 40) {
+                frame.minimizer.alpha *= 0.99;
+            }
+        }),
+        ("contacts here", |s| {
+            if let Some(frame) = s.frame.as_mut().filter(|f| f.step == 40) {
+                frame.contacts.pop();
+                frame.forces.pop();
+            }
+        }),
+    ];
+    for (name, forge) in forgeries {
+        let forged = record(&scene(), forge);
+        let found = WAYS.map(|way| replay(&forged, way).expect("a verdict").difference);
+        let text = found[0].as_ref().expect(name).to_string();
+        assert!(text.contains(name), "{text}");
+        assert_eq!(found[0], found[1]);
+        assert_eq!(found[0], found[2]);
+    }
+}
+
+#[test]
+fn forces_that_do_not_balance_are_told_from_positions_alone() {
+    let forged = record(&scene(), |snapshot| {
+        if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.step == 80) {
+            frame.forces[3] *= 1.0 + 1e-6;
+        }
+    });
+    let scene = scene();
+    for (bytes, good) in [(record(&scene, |_| {}), true), (forged, false)] {
+        let mut recording = open(&bytes).expect("a recording");
+        let mut balance = Balance::new(&scene);
+        while let Some(event) = recording.next() {
+            if let Event::State(frame) = event.expect("undamaged") {
+                balance.check(&recording.packing(&frame).expect("its packing"), &frame);
+            }
+        }
+        assert_eq!(balance.agrees(), good);
+        assert!(balance.bears_out(&recording.outcome().expect("a result")));
+        if !good {
+            assert_eq!((balance.equation_4.step, balance.forces.step), (80, 80));
+            assert!((balance.forces.value / 1e-6 - 1.0).abs() < 0.99);
+        }
+    }
+}
+
+#[test]
+fn both_contact_rules_and_a_lattice_verify() {
+    let base = scene();
+    let scenes = [
+        Scene {
+            contact_rule: softjam::contact::Rule::Seed,
+            ..base.clone()
+        },
+        Scene {
+            contact_solver: softjam::contact::solver::Method::SparseCholesky,
+            ..base.clone()
+        },
+        Scene {
+            start: softjam::scene::Start::Hexagonal,
+            ..base
+        },
+    ];
+    for scene in scenes {
+        let bytes = record(&scene, |_| {});
+        for way in WAYS {
+            assert_eq!(
+                replay(&bytes, way).expect("a verdict").difference,
+                None,
+                "{scene:?}"
+            );
+        }
+    }
+}
+
+/// Where the numbers of a recorded state lie in the file: positions, velocities, contacts, forces, minimiser; without
+/// those that another state shares, like the contacts of a packing that has settled.
+fn state_bytes(bytes: &[u8], frame: &Frame) -> Vec<std::ops::Range<usize>> {
+    let vectors = |v: &[softjam::domain::Vec2]| -> Vec<u8> {
+        v.iter()
+            .flat_map(|p| [p.x, p.y])
+            .flat_map(f64::to_le_bytes)
+            .collect()
+    };
+    let parts: [Vec<u8>; 5] = [
+        vectors(&frame.positions),
+        vectors(&frame.velocities),
+        frame
+            .contacts
+            .iter()
+            .flatten()
+            .flat_map(|c| c.to_le_bytes())
+            .collect(),
+        frame.forces.iter().flat_map(|f| f.to_le_bytes()).collect(),
+        frame
+            .minimizer
+            .values()
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect(),
+    ];
+    parts
+        .iter()
+        .filter_map(|part| {
+            let mut places =
+                (0..=bytes.len() - part.len()).filter(|p| bytes[*p..].starts_with(part.as_slice()));
+            let start = places.next()?;
+            places.next().is_none().then(|| start..start + part.len())
+        })
+        .collect()
+}
+
+#[test]
+fn any_flipped_bit_of_a_state_is_noticed_with_its_step() {
+    let mut bytes = record(&scene(), |_| {});
+    let frames = states(&bytes);
+    let mut random = Random::new(3);
+    for attempt in 0..200 {
+        // Velocities of frame 0 are zeros, which are everywhere.
+        let frame = &frames[1 + random.below(frames.len() - 1)];
+        let ranges = state_bytes(&bytes, frame);
+        assert!(
+            ranges.len() >= 4,
+            "positions, velocities, forces and minimiser are never the same"
+        );
+        let range = &ranges[random.below(ranges.len())];
+        let (place, bit) = (
+            range.start + random.below(range.len()),
+            1 << random.below(8),
+        );
+        bytes[place] ^= bit;
+        let result = replay(&bytes, Way::Segments(2));
+        let text = match result {
+            Err(error) => error.to_string(),
+            Ok(verdict) => verdict.difference.expect("noticed").to_string(),
+        };
+        assert!(
+            text.contains(&format!("step {}", frame.step)),
+            "attempt {attempt}: {text}"
+        );
+        bytes[place] ^= bit;
+    }
+}
+
+#[test]
+fn a_recording_cut_anywhere_never_passes_for_a_whole_one() {
+    let bytes = record(&scene(), |_| {});
+    let mut random = Random::new(4);
+    let mut whole_states = 0;
+    for _ in 0..200 {
+        let length = random.below(bytes.len());
+        let Ok(mut recording) = open(&bytes[..length]) else {
+            continue;
+        };
+        let read: Result<Vec<Event>, ReadError> = recording.by_ref().collect();
+        assert!(
+            read.is_err() || !recording.is_closed(),
+            "{length} of {} bytes",
+            bytes.len()
+        );
+        whole_states += u32::from(recording.intact().is_some());
+    }
+    assert!(
+        whole_states > 0,
+        "no cut left a state: the test tests nothing"
+    );
+    assert!({
+        let mut recording = open(&bytes).expect("whole");
+        recording.by_ref().for_each(drop);
+        recording.is_closed()
+    });
+}
+
+#[test]
+fn flipped_bits_anywhere_never_panic() {
+    let bytes = record(
+        &Scene {
+            particles: 32,
+            steps: 60,
+            ..scene()
+        },
+        |_| {},
+    );
+    let mut random = Random::new(5);
+    for _ in 0..2000 {
+        let mut copy = bytes.clone();
+        for _ in 0..1 + random.below(4) {
+            let place = random.below(copy.len());
+            copy[place] ^= 1 << random.below(8);
+        }
+        if let Ok(recording) = open(&copy) {
+            recording.for_each(drop);
+        }
+    }
+}
+
+#[test]
+fn recordings_in_a_row_missing_states_and_wrong_results_each_have_their_error() {
+    let scene = scene();
+    let bytes = record(&scene, |_| {});
+    let error = |bytes: &[u8]| {
+        open(bytes)
+            .expect("a header")
+            .find_map(Result::err)
+            .expect("an error")
+    };
+    let twice = [bytes.clone(), bytes.clone()].concat();
+    let text = error(&twice).to_string();
+    assert!(text.contains("follow the end of the recording"), "{text}");
+
+    // A recorder that drops, or repeats, a frame.
+    let without = record(&scene, |s| s.state &= s.step != 60);
+    match error(&without) {
+        ReadError::Steps {
+            intact, problem, ..
+        } => {
+            assert_eq!(intact, Some(40));
+            assert_eq!(
+                problem,
+                "the states between step 40 and step 80 are missing"
+            );
+        }
+        other => panic!("{other}"),
+    }
+    let swapped = record(&scene, |s| {
+        if s.state && s.step == 60 {
+            s.step = 20;
+            s.frame.iter_mut().for_each(|frame| frame.step = 20);
+        }
+    });
+    assert!(matches!(
+        error(&swapped),
+        ReadError::Steps {
+            intact: Some(40),
+            ..
+        }
+    ));
+    let late = record(&scene, |s| s.state &= s.step > 0);
+    assert!(matches!(
+        error(&late),
+        ReadError::Steps { intact: None, .. }
+    ));
+}
+
+#[test]
+fn a_recording_without_states_says_that_it_cannot_be_replayed() {
+    let mut scene = scene();
+    scene.channels.state = Schedule::Off;
+    let bytes = record(&scene, |_| {});
+    let error = replay(&bytes, Way::Whole).expect_err("nothing to replay");
+    assert!(matches!(error, ReplayError::NoState { .. }));
+    assert_eq!(
+        error.to_string(),
+        "test holds no state: it can be looked at, not replayed"
+    );
+}
+
+#[test]
+fn a_newer_format_is_refused_by_its_number() {
+    let bytes = record(
+        &Scene {
+            steps: 0,
+            ..scene()
+        },
+        |_| {},
+    );
+    // The version is a u32 1 in a padded buffer of its own in the header; find it by trying.
+    let mut versions = Vec::new();
+    for place in (0..bytes.len().min(200_000) - 64).step_by(4) {
+        if bytes[place..place + 4] == [1, 0, 0, 0]
+            && bytes[place + 4..place + 60].iter().all(|b| *b == 0)
+        {
+            let mut newer = bytes.clone();
+            newer[place] = 7;
+            if let Err(error @ ReadError::Newer { .. }) = open(&newer) {
+                versions.push(error.to_string());
+            }
+        }
+    }
+    assert!(!versions.is_empty(), "the version was not found");
+    assert!(
+        versions
+            .iter()
+            .all(|v| v.contains("format version 7, this program reads up to 1"))
+    );
+}
+
+#[test]
+fn a_changed_radius_is_found() {
+    let mut scene = scene();
+    scene.radii = softjam::scene::Radii::Spread { min: 0.4, max: 0.6 };
+    let mut bytes = record(&scene, |_| {});
+    let radius = open(&bytes).expect("a recording").radii()[11];
+    let needle = radius.to_le_bytes();
+    let place = bytes
+        .windows(8)
+        .position(|w| w == needle)
+        .expect("it is in the file");
+    bytes[place] ^= 1;
+    for way in WAYS {
+        let difference = replay(&bytes, way)
+            .expect("a verdict")
+            .difference
+            .expect("found");
+        assert!(
+            difference.to_string().contains("radius of particle 11"),
+            "{difference}"
+        );
+    }
+}
+
+#[test]
+fn golden_recordings_verify() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
+    let cases = [
+        ("jammed", true, true),
+        ("near-jamming", true, true),
+        ("hexagonal", true, true),
+        ("state-only", true, true),
+        ("step-limit", true, false),
+        ("killed", false, false),
+    ];
+    let mut size = 0;
+    for (name, closed, converged) in cases {
+        let path = folder.join(name).with_extension("rrd");
+        size += std::fs::metadata(&path).expect(name).len();
+        for way in WAYS {
+            let mut recording = Recording::open(&path).expect(name);
+            let mut balance = Balance::new(recording.scene());
+            let verdict = determinism(&mut recording, way, |packing, frame| {
+                balance.check(packing, frame);
+            });
+            let verdict = verdict.expect(name);
+            assert_eq!(verdict.difference, None, "{name}");
+            assert!(balance.agrees(), "{name}: {balance:?}");
+            assert_eq!(recording.is_closed(), closed, "{name}");
+            assert_eq!(
+                recording.outcome().is_some_and(|end| end.converged),
+                converged,
+                "{name}"
+            );
+            if let Some(end) = recording.outcome() {
+                assert!(balance.bears_out(&end), "{name}");
+            }
+        }
+    }
+    assert!(size < 8 << 20, "{size} bytes of golden recordings");
+}
