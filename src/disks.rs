@@ -19,7 +19,7 @@ use core::f64::consts::PI;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DiskParameters {
-    /// The relaxation ends when `f_max` (γ) is not above this.
+    /// The relaxation ends when `f_max` (units of γ) is not above this.
     pub threshold: f64,
     /// The relaxation ends after this many steps in any case.
     pub steps: u64,
@@ -41,7 +41,7 @@ impl Default for DiskParameters {
 pub struct DiskReport {
     /// Steps made.
     pub steps: u64,
-    /// The largest net force at the end (γ).
+    /// The largest net force at the end (units of γ).
     pub f_max: f64,
     /// Whether `f_max` is not above the threshold.
     pub converged: bool,
@@ -81,6 +81,7 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     loop {
         disk_forces(packing, &mut neighbors, line_tension, &mut net, &mut pairs);
         let f_max = largest_force(&net);
+        let f_max = f_max / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &pairs);
@@ -108,8 +109,8 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     }
 }
 
-/// `dt_max √k` of the stiffest pair. With six contacts around a disk `ω_max² ≈ 12 k` at most, so that 0.41 lies well
-/// within the bound 2/ω_max; twice as much multiplies the steps by five.
+/// `dt_max √k` of the stiffest pair. The triangular lattice has `ω_max² = 6 k`, so that 2/√6 = 0.82 is the limit of
+/// stability of the densest contact network; half of it keeps clear, the whole multiplies the steps by five.
 const DT_MAX: f64 = 0.41;
 
 /// Net forces of the disks into `net`, the overlapping pairs into `touching`.

@@ -62,7 +62,7 @@ pub fn largest_force(net: &[Vec2]) -> f64 {
     squared.sqrt()
 }
 
-/// What a frame is worth in numbers. Units: γ for forces, length for lengths.
+/// What a frame is worth in numbers, all in units of the line tension γ: they do not depend on its value.
 ///
 /// # Example
 ///
@@ -78,7 +78,7 @@ pub fn largest_force(net: &[Vec2]) -> f64 {
 pub struct Observables {
     /// Number of particles `N`.
     pub particles: usize,
-    /// Largest net force `f_max` (γ).
+    /// Largest net force `f_max` (units of γ).
     pub f_max: f64,
     /// Stored energy of the contact problem `U = ½ Σ_c δ_c f_c` (γ·length).
     pub energy: f64,
@@ -98,7 +98,7 @@ pub struct Observables {
 }
 
 impl Observables {
-    /// Observables of contacts in `domain` whose net forces have the largest magnitude `f_max`.
+    /// Observables of contacts in `domain` at line tension γ (force), with `f_max` in units of γ and the time step `dt`.
     ///
     /// # Panics
     ///
@@ -114,7 +114,7 @@ impl Observables {
     ///     overlaps: &[0.1],
     ///     forces: &[0.4],
     /// };
-    /// let o = Observables::of(&contacts, Domain::new(6.0, 6.0).unwrap(), 3, 0.4, 0.1);
+    /// let o = Observables::of(&contacts, Domain::new(6.0, 6.0).unwrap(), 3, 1.0, (0.4, 0.1));
     /// assert_eq!((o.contacts, o.rattlers, o.coordination()), (1, 3, 0.0), "one contact holds nobody");
     /// assert_eq!(o.energy, 0.5 * 0.1 * 0.4);
     /// assert!((o.pressure() - 0.4 * 0.9 / 72.0).abs() < 1e-16);
@@ -124,8 +124,8 @@ impl Observables {
         contacts: &Contacts<'_>,
         domain: Domain,
         particles: usize,
-        f_max: f64,
-        dt: f64,
+        line_tension: f64,
+        (f_max, dt): (f64, f64),
     ) -> Self {
         let mut o = Self {
             particles,
@@ -142,8 +142,9 @@ impl Observables {
             o.stress[2] -= moment * n.y * n.y;
             o.contacts += usize::from(f > 0.0);
         }
+        o.energy /= line_tension;
         for s in &mut o.stress {
-            *s /= domain.area();
+            *s /= domain.area() * line_tension;
         }
         let touching = contacts.pairs.iter().zip(contacts.forces);
         let touching: Vec<[u32; 2]> = touching
@@ -187,7 +188,8 @@ impl Observables {
     /// ```
     #[must_use]
     pub fn pressure(&self) -> f64 {
-        -0.5 * (self.stress[0] + self.stress[2])
+        // Adding 0 makes the pressure of no contacts 0 and not −0.
+        -0.5 * (self.stress[0] + self.stress[2]) + 0.0
     }
 
     /// Mean coordination number of the particles that are held, `Z = 2 N_c / (N − N_rattlers)`, `N_c` the contacts

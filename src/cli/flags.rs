@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 use clap::Args;
 use softjam::scene::{Channels, Scene, SceneError, SceneFields, Schedule};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct SceneFlags {
@@ -24,14 +24,14 @@ pub struct SceneFlags {
     aspect: Option<f64>,
 
     /// Seed of the random start.
-    #[arg(long, short = 's', value_name = "SEED", help_heading = PACKING)]
+    #[arg(long, short = 's', value_name = "SEED", allow_negative_numbers = true, help_heading = PACKING)]
     seed: Option<u64>,
 
     /// Where the centres come from: random, hexagonal or file.
     #[arg(long, value_name = "START", help_heading = PACKING)]
     start: Option<String>,
 
-    /// Start from a CSV file of x, y, radius with a comment `# box = L_x, L_y`.
+    /// Start from a CSV file of x, y, radius with a comment `# box = L_x, L_y` (its path is taken from where you are).
     #[arg(long, value_name = "PACKING.csv", help_heading = PACKING)]
     file: Option<String>,
 
@@ -64,12 +64,13 @@ pub struct SceneFlags {
     #[arg(long, value_name = "LIST", value_parser = channel_list, help_heading = RECORDING)]
     channels: Option<ChannelList>,
 
-    /// Record contours, contacts and state at every K-th step (metrics are small and keep their schedule).
+    /// Record contours, contacts and state at every K-th step, unless --channels gives them a schedule (metrics are small
+    /// and keep theirs).
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = RECORDING)]
     every: Option<i64>,
 
     /// Vertices of a contour, beside those on the contacts.
-    #[arg(long, value_name = "N", help_heading = RECORDING)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = RECORDING)]
     vertices: Option<usize>,
 }
 
@@ -94,6 +95,11 @@ impl SceneFlags {
                     .with_context(|| format!("scene file {}", path.display()))?
             }
         })
+    }
+
+    /// The scene file, if one is named.
+    pub fn path(&self) -> Option<&Path> {
+        self.scene.as_deref()
     }
 
     /// The scene of these fields, overridden by the flags.
@@ -143,18 +149,19 @@ impl SceneFlags {
         }
         if let Some(k) = self.every {
             let every = u64::try_from(k).ok().filter(|k| *k >= 1);
+            let explicit = |k: usize| {
+                let mut list = self.channels.iter().flatten();
+                list.any(|(channel, schedule)| *channel == k && schedule.is_some())
+            };
             let every = every.ok_or_else(|| SceneError::Range {
                 field: "every".to_owned(),
                 value: k.to_string(),
                 allowed: "every ≥ 1 (steps)".to_owned(),
             })?;
-            for place in [
-                &mut channels.contours,
-                &mut channels.contacts,
-                &mut channels.state,
-            ] {
-                if place.is_on() {
-                    *place = Schedule::Every(every);
+            const METRICS: usize = 2;
+            for (k, (_, schedule)) in channels.named().into_iter().enumerate() {
+                if k != METRICS && schedule.is_on() && !explicit(k) {
+                    *channel(&mut channels, k) = Schedule::Every(every);
                 }
             }
         }

@@ -101,7 +101,7 @@ fn state_of(found: &Findings, closed: bool) -> String {
                 end.steps, end.f_max
             )
         }
-        (None, true) => "unfinished: the run was interrupted".to_owned(),
+        (None, true) => "unfinished: the run was interrupted or failed".to_owned(),
         (None, false) => "unfinished: the file breaks off".to_owned(),
     }
 }
@@ -132,10 +132,12 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         line(channel, format!("{count} steps, {first} … {last}"));
     }
     if !found.channels.contains_key("state") {
-        line(
-            "state",
-            "none: the recording can be looked at, not replayed".to_owned(),
-        );
+        let none = if scene.channels.state.is_on() {
+            "none: the file breaks off before the first"
+        } else {
+            "none: the recording can be looked at, not replayed"
+        };
+        line("state", none.to_owned());
     }
     for (name, value) in &found.metrics {
         line(name, format!("{value:.6e}"));

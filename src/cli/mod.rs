@@ -103,7 +103,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         error.downcast_ref::<RecordError>(),
     ) {
         (Some(RelaxError::Scene(e)), _) => scene(e),
-        (_, Some(RecordError::Exists { .. })) => 2,
+        (_, Some(RecordError::Exists { .. } | RecordError::Input { .. })) => 2,
         _ => 1,
     }
 }

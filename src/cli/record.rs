@@ -6,12 +6,12 @@ use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
-use softjam::record::{self, Header, Summary, Writer};
+use softjam::record::{self, Header, RecordError, Summary, Writer};
 use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
-use softjam::scene::{Scene, SceneError, SceneFields};
+use softjam::scene::{Scene, SceneError, SceneFields, Start};
 use std::fmt::Write as _;
-use std::io::IsTerminal as _;
+use std::io::{self, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,21 +61,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     };
     let scene = origin.scene().clone();
     fits_in_memory(&scene)?;
-    // Before minutes are spent on a packing that could not be written.
-    if !arguments.force && arguments.output.exists() {
-        return Err(record::RecordError::Exists {
-            path: arguments.output.display().to_string(),
-        }
-        .into());
+    can_be_written(arguments, &scene)?;
+    if scene.threshold < scene.contact_tolerance {
+        warn(&format!(
+            "threshold = {:e} is below what contact_tolerance = {:e} resolves: the run may never converge",
+            scene.threshold, scene.contact_tolerance
+        ));
     }
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            // Asked twice: the user does not want to wait for the end of a step, or of the disks.
-            std::process::exit(1);
-        }
-    })?;
+    let phase = Phase::watch_for_signals()?;
 
     let start = Instant::now();
     let mut run = match origin {
@@ -84,11 +77,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     };
     let disks = start.elapsed();
     let writer = Writer::create(&arguments.output, arguments.force, Header::of(&scene, &run))?;
+    phase.recording();
     let bar = Bar::new(&scene);
     let start = Instant::now();
     let recorded = record::record(&mut run, writer, &scene.channels, |run| {
         bar.show(run, start);
-        !interrupted.load(Ordering::Relaxed)
+        phase.goes_on()
     });
     bar.clear();
     let summary = recorded?;
@@ -104,6 +98,89 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         Some(outcome) if outcome.converged => Verdict::Good,
         Some(_) => Verdict::Bad,
     })
+}
+
+/// Before minutes are spent on a packing that could not be written.
+fn can_be_written(arguments: &Arguments, scene: &Scene) -> Result<(), RecordError> {
+    let output = &arguments.output;
+    let path = output.display().to_string();
+    let create = |kind: io::ErrorKind| RecordError::Create {
+        path: path.clone(),
+        source: kind.into(),
+    };
+    if output.is_dir() {
+        return Err(create(io::ErrorKind::IsADirectory));
+    }
+    let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
+    if folder.is_some_and(|folder| !folder.is_dir()) {
+        return Err(create(io::ErrorKind::NotFound));
+    }
+    if !output.exists() {
+        return Ok(());
+    }
+    let start = match &scene.start {
+        Start::File { path, .. } => Some(Path::new(path)),
+        Start::Random | Start::Hexagonal => None,
+    };
+    let inputs = [arguments.from.as_deref(), start, arguments.scene.path()];
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if inputs
+        .into_iter()
+        .flatten()
+        .any(|input| same(input, output))
+    {
+        return Err(RecordError::Input { path });
+    }
+    if arguments.force {
+        Ok(())
+    } else {
+        Err(RecordError::Exists { path })
+    }
+}
+
+fn warn(text: &str) {
+    // A warning that nobody can read is no failure.
+    let _ = writeln!(io::stderr(), "warning: {text}");
+}
+
+/// What Ctrl-C and SIGTERM find: nothing to lose while the disks relax, a recording to close afterwards.
+#[derive(Clone)]
+struct Phase {
+    recording: Arc<AtomicBool>,
+    interrupted: Arc<AtomicBool>,
+}
+
+impl Phase {
+    fn watch_for_signals() -> anyhow::Result<Self> {
+        let phase = Self {
+            recording: Arc::default(),
+            interrupted: Arc::default(),
+        };
+        let seen = phase.clone();
+        ctrlc::set_handler(move || {
+            let again = seen.interrupted.swap(true, Ordering::Relaxed);
+            if again || !seen.recording.load(Ordering::Relaxed) {
+                warn(if again {
+                    "aborted"
+                } else {
+                    "interrupted before the first frame; no file was written"
+                });
+                std::process::exit(1);
+            }
+            warn(
+                "ending behind this step; once more to abort, which may leave the file without its last steps",
+            );
+        })?;
+        Ok(phase)
+    }
+
+    fn recording(&self) {
+        self.recording.store(true, Ordering::Relaxed);
+    }
+
+    fn goes_on(&self) -> bool {
+        !self.interrupted.load(Ordering::Relaxed)
+    }
 }
 
 /// Where a run begins.
@@ -246,15 +323,18 @@ fn report(
         let _ = writeln!(text, "{name:<14} {value}");
     };
     line("result", verdict);
+    let origin = match &scene.start {
+        Start::File { path, .. } => format!("from {path}"),
+        Start::Random | Start::Hexagonal => format!("seed {}", scene.seed),
+    };
     line(
         "packing",
         format!(
-            "N = {}, φ = {:.4}, box {:.3} × {:.3}, seed {}",
+            "N = {}, φ = {:.4}, box {:.3} × {:.3}, {origin}",
             packing.len(),
             packing.coverage(),
             l.x,
-            l.y,
-            scene.seed
+            l.y
         ),
     );
     if let Some(disks) = run.disks() {
@@ -274,9 +354,9 @@ fn report(
     line(
         "Z",
         format!(
-            "{:.4} ({} contacts, {} rattlers)",
+            "{:.4} ({} contacts between particles that are held, {} rattlers)",
             o.coordination(),
-            o.contacts,
+            o.backbone_contacts,
             o.rattlers
         ),
     );

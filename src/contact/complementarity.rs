@@ -38,8 +38,9 @@ pub enum Rule {
     /// The contact law is solved in every step: forces and gaps are ≥ 0 and the list depends on the positions alone.
     #[default]
     Complementarity,
-    /// Saitoh 2.2.5 to the letter: in every step solve, drop the contacts with `f < 0`, add the pairs with `Δ > 0`,
-    /// solve once more. The list is then a matter of history and a force can be negative for a step.
+    /// Saitoh 2.2.5: in every step solve, drop the contacts with `f < 0`, add the pairs with `Δ > 0`, solve once more. The
+    /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
+    /// exceed the solver's tolerance.)
     Seed,
 }
 
@@ -62,6 +63,19 @@ pub enum ContactError {
         reach: f64,
         /// The shorter side of the box (length).
         shortest: f64,
+    },
+    /// The forces are so large that a contour would bulge by several radii.
+    #[error(
+        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces are absurd, \
+         as after a step that was too long or in a start that overlaps far too much"
+    )]
+    Absurd {
+        /// The particle.
+        particle: usize,
+        /// The bound of its bulge (length).
+        bulge: f64,
+        /// Its undeformed radius (length).
+        radius: f64,
     },
     /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
     #[error(
@@ -135,6 +149,9 @@ pub struct Work {
     /// Gaps evaluated of pairs outside the set.
     pub gaps: u64,
 }
+
+/// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
+const WIDEST_BULGE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -438,9 +455,10 @@ impl ContactLaw {
             *bulge *= radius / (2.0 * PI * self.line_tension);
             largest = largest.max(*bulge);
         }
-        // No two nearest images are farther apart than half of each side.
-        let margin = (2.0 * largest).min(packing.domain().lengths().norm());
-        let skin = 0.3 * packing.largest_radius();
+        // The forces of an unfinished exchange can be anything; pairs beyond this reach are left to a later sweep.
+        let radius = packing.largest_radius();
+        let margin = 2.0 * largest.min(WIDEST_BULGE * radius);
+        let skin = 0.3 * radius;
         self.neighbors.update(packing, margin, skin + 0.5 * margin);
     }
 
@@ -448,8 +466,15 @@ impl ContactLaw {
     fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
         let shortest = packing.domain().shortest();
         for (particle, (bulge, radius)) in self.bulges.iter().zip(packing.radii()).enumerate() {
+            if bulge.is_nan() || *bulge > WIDEST_BULGE * packing.largest_radius() {
+                return Err(ContactError::Absurd {
+                    particle,
+                    bulge: *bulge,
+                    radius: *radius,
+                });
+            }
             let reach = radius + bulge;
-            if reach.is_nan() || 4.0 * reach > shortest {
+            if 4.0 * reach > shortest {
                 return Err(ContactError::BoxTooSmall {
                     particle,
                     reach,
@@ -460,7 +485,7 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest offence.
+    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest offence, below it or above.
     fn find_offences(&mut self, packing: &Packing, tolerance: f64) -> f64 {
         self.offending.clear();
         let (radii, positions) = (packing.radii(), packing.positions());
@@ -495,11 +520,11 @@ impl ContactLaw {
             let gap = self
                 .geometry
                 .gap(packing, self.line_tension, &self.forces, i, j);
+            worst = worst.max(-gap);
             if gap < -tolerance {
                 let compliance =
                     -G_AT_CONTACT * (radii[i] + radii[j]) / (2.0 * PI * self.line_tension);
                 self.offending.push(Offence::Add(pair, -gap / compliance));
-                worst = worst.max(-gap);
             }
         }
         worst.max(drop_before(

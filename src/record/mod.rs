@@ -44,6 +44,18 @@ pub const FORMAT_VERSION: u32 = 1;
 /// ```
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
+/// The id of a recording of `scene`: the first half of the scene's BLAKE3 in hexadecimal, so that the same scene has the
+/// same id.
+///
+/// ```
+/// use softjam::{record::recording_id, scene::Scene};
+/// assert_eq!(recording_id(&Scene::default()).len(), 32);
+/// ```
+#[must_use]
+pub fn recording_id(scene: &Scene) -> String {
+    blake3::Hash::from_bytes(scene.digest()).to_hex()[..32].to_owned()
+}
+
 /// What a recording says of itself before its first frame.
 ///
 /// ```
@@ -141,7 +153,7 @@ pub struct Outcome {
     pub converged: bool,
     /// Moves made.
     pub steps: u64,
-    /// The last `f_max` (γ).
+    /// The last `f_max` (units of γ).
     pub f_max: f64,
 }
 
@@ -165,6 +177,12 @@ pub enum RecordError {
     /// The file exists and is not to be replaced.
     #[error("{path} exists; say --force to replace it, or name another file with -o")]
     Exists {
+        /// Path of the file.
+        path: String,
+    },
+    /// The file is one that the run reads from.
+    #[error("{path} is an input of this run; name another file with -o")]
+    Input {
         /// Path of the file.
         path: String,
     },
@@ -240,8 +258,8 @@ pub fn record(
             });
         }
         if let Err(error) = run.advance() {
-            // What was recorded before stays readable; the failure is the news.
-            writer.finish(None)?;
+            // What was recorded before stays readable. Should closing fail as well, the first failure is the news.
+            drop(writer.finish(None));
             return Err(error.into());
         }
     }

@@ -15,7 +15,7 @@
 //! steps are written together, the state last.
 
 use super::encode::Encoder;
-use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Snapshot, Written, blueprint};
+use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Snapshot, Written, blueprint, recording_id};
 use crate::contact::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
@@ -114,10 +114,9 @@ impl<W: Write> RrdRecorder<W> {
     /// See the example of [`RrdRecorder`].
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let mut encoder = Encoder::new(sink)?;
-        let id = blake3::Hash::from_bytes(header.scene.digest()).to_hex();
-        let recording = &id.as_str()[..32];
+        let recording = &recording_id(&header.scene);
         blueprint::write(&mut encoder, recording, header.packing.domain())?;
-        let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
+        let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording.as_str());
         encoder.open(&store)?;
         write_header(&mut encoder, &store, &header)?;
         Ok(Self {

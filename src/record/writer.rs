@@ -172,7 +172,10 @@ fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Wri
         source,
     };
     let cut = file.try_clone().map_err(start)?;
-    let mut recorder = RrdRecorder::new(file, header).map_err(start)?;
+    let mut recorder = RrdRecorder::new(file, header).map_err(|source| {
+        drop(cut.set_len(0));
+        start(source)
+    })?;
     let mut outcome = None;
     let mut result = Ok(());
     while result.is_ok() {
@@ -189,7 +192,14 @@ fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Wri
         }
     }
     result
-        .and_then(|()| recorder.finish(outcome))
+        .and_then(|()| {
+            let written = recorder.finish(outcome)?;
+            match cut.sync_data() {
+                // Pipes and devices have nothing to bring to the disk.
+                Err(e) if e.kind() != io::ErrorKind::InvalidInput => Err(e),
+                _ => Ok(written),
+            }
+        })
         .map_err(|source| {
             // A message that reached the disk in part would be a torn end. What is no file cannot be cut, and need not be.
             drop(cut.set_len(recorder.written()));

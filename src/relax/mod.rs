@@ -44,6 +44,8 @@ pub enum Status {
     Converged,
     /// The step limit came first.
     StepLimit,
+    /// A step could not be made; see the error of [`Relaxation::advance`].
+    Failed,
 }
 
 /// Why a relaxation cannot go on.
@@ -61,15 +63,19 @@ pub enum RelaxError {
         /// What went wrong.
         source: ContactError,
     },
-    /// A number left the range of numbers: the time step is too long for this scene.
+    /// A particle was thrown through the box: the time step is too long for this scene.
     #[error(
-        "step {step}: particle {particle} is not at a finite place; choose a smaller dt_max than {dt_max}"
+        "step {step}: particle {particle} moved by {distance:.3e} in one step of {dt:.3e}; choose a smaller dt_max than {dt_max:.3e}"
     )]
-    NotFinite {
+    TooFar {
         /// The step.
         step: u64,
         /// The particle.
         particle: usize,
+        /// How far it moved (length).
+        distance: f64,
+        /// The time step.
+        dt: f64,
         /// The bound of the time step in use.
         dt_max: f64,
     },
@@ -107,6 +113,7 @@ pub struct Relaxation {
     f_max: f64,
     disks: Option<DiskReport>,
     yielded: bool,
+    failed: bool,
 }
 
 impl Relaxation {
@@ -173,6 +180,7 @@ impl Relaxation {
             f_max: 0.0,
             disks: None,
             yielded: false,
+            failed: false,
         };
         run.balance();
         Ok(run)
@@ -212,6 +220,7 @@ impl Relaxation {
             f_max: 0.0,
             disks: None,
             yielded: false,
+            failed: false,
         };
         run.balance();
         Ok(run)
@@ -221,8 +230,8 @@ impl Relaxation {
     ///
     /// # Errors
     ///
-    /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::NotFinite`] if the run blew up. The
-    /// run is then of no further use.
+    /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::TooFar`] if the run blew up. The
+    /// run has then [failed](Status::Failed) and is of no further use.
     ///
     /// ```
     /// # use softjam::{relax::Relaxation, scene::Scene};
@@ -240,27 +249,31 @@ impl Relaxation {
             domain,
         );
         self.step += 1;
-        let lost = |p: &Vec2| !(p.x.is_finite() && p.y.is_finite());
-        if let Some(particle) = self.velocities.iter().position(lost) {
-            return Err(RelaxError::NotFinite {
+        let dt = self.state.dt;
+        let far = 0.25 * domain.shortest();
+        let thrown = |v: &Vec2| (v * dt).norm() > far || v.norm().is_nan();
+        if let Some(particle) = self.velocities.iter().position(thrown) {
+            self.failed = true;
+            return Err(RelaxError::TooFar {
                 step: self.step,
                 particle,
+                distance: (self.velocities[particle] * dt).norm(),
+                dt,
                 dt_max: self.state.dt_max,
             });
         }
-        self.law
-            .solve_again(&self.packing)
-            .map_err(|source| RelaxError::Contact {
-                step: self.step,
-                source,
-            })?;
+        if let Err(source) = self.law.solve_again(&self.packing) {
+            self.failed = true;
+            let step = self.step;
+            return Err(RelaxError::Contact { step, source });
+        }
         self.balance();
         Ok(())
     }
 
     fn balance(&mut self) {
         net_forces(&self.law.contacts(), &mut self.net);
-        self.f_max = largest_force(&self.net);
+        self.f_max = largest_force(&self.net) / self.law.line_tension();
     }
 
     /// How the run stands at this frame.
@@ -272,7 +285,11 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn status(&self) -> Status {
-        if self.f_max <= self.threshold && self.law.residual() <= self.law.accepted_residual() {
+        if self.failed {
+            Status::Failed
+        } else if self.f_max <= self.threshold
+            && self.law.residual() <= self.law.accepted_residual()
+        {
             Status::Converged
         } else if self.step >= self.step_limit {
             Status::StepLimit
@@ -325,7 +342,7 @@ impl Relaxation {
         self.law.contacts()
     }
 
-    /// The net forces `F_i`, one a particle (γ).
+    /// The net forces `F_i`, one a particle (force; `line_tension` is in the same unit).
     ///
     /// ```
     /// # use softjam::{relax::Relaxation, scene::Scene};
@@ -362,7 +379,7 @@ impl Relaxation {
         self.state.time
     }
 
-    /// The largest net force `f_max` (γ).
+    /// The largest net force `f_max` (units of γ).
     ///
     /// ```
     /// # use softjam::{relax::Relaxation, scene::Scene};
@@ -387,8 +404,8 @@ impl Relaxation {
             &self.law.contacts(),
             self.packing.domain(),
             self.packing.len(),
-            self.f_max,
-            self.state.dt,
+            self.law.line_tension(),
+            (self.f_max, self.state.dt),
         )
     }
 
@@ -427,9 +444,6 @@ impl Iterator for Relaxation {
                 return None;
             }
             if let Err(error) = self.advance() {
-                // The iterator ends behind the error.
-                self.step_limit = 0;
-                self.threshold = f64::INFINITY;
                 return Some(Err(error));
             }
         }

@@ -69,7 +69,7 @@ pub struct Balance {
     pub contacts: Worst,
     /// Frames seen.
     pub frames: u64,
-    /// The step of the last frame, and its `f_max` from positions alone (γ).
+    /// The step of the last frame, and its `f_max` from positions alone (units of γ).
     pub last: Option<(u64, f64)>,
     /// The first frame whose contact problem had no answer.
     pub failed: Option<(u64, ContactError)>,
@@ -137,7 +137,7 @@ impl Balance {
         }
         let mut net = vec![Vec2::zeros(); packing.len()];
         net_forces(&view, &mut net);
-        self.last = Some((step, largest_force(&net)));
+        self.last = Some((step, largest_force(&net) / self.law.line_tension()));
         match self.law.solve(packing, &[], &[]) {
             Ok(()) => self.compare(view.pairs, view.forces, strongest, step),
             Err(error) => self.failed = self.failed.take().or(Some((step, error))),

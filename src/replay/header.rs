@@ -3,7 +3,7 @@
 use super::ReadError;
 use super::stream::{Message, Stream, guarded};
 use crate::domain::Domain;
-use crate::record::FORMAT_VERSION;
+use crate::record::{FORMAT_VERSION, recording_id};
 use crate::scene::Scene;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::Chunk;
@@ -60,6 +60,14 @@ impl Header {
                         program,
                         from_step,
                     } = about.ok_or(missing("scene"))?;
+                    let id = recording_id(&scene);
+                    if store.recording_id().as_str() != id {
+                        return Err(ReadError::Changed {
+                            path: path.to_owned(),
+                            found: store.recording_id().as_str().to_owned(),
+                            expected: id,
+                        });
+                    }
                     let read = guarded(|| Ok(particles(&chunk)));
                     let (radii, domain) = read.map_err(damaged)?.map_err(missing)?;
                     return Ok(Self {

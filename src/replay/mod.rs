@@ -109,6 +109,18 @@ pub enum ReadError {
         /// What is wrong with it.
         source: SceneError,
     },
+    /// The recording was made of another scene than the one it names.
+    #[error(
+        "the scene in {path} was changed after it was recorded: the recording is {found}, its scene makes {expected}"
+    )]
+    Changed {
+        /// Path of the file.
+        path: String,
+        /// The recording's id.
+        found: String,
+        /// The id that its scene gives.
+        expected: String,
+    },
     /// The stream is damaged.
     #[error("{path} is damaged: {problem}; {}", intact_up_to(*intact))]
     Damaged {

@@ -42,7 +42,7 @@ pub(super) enum Message {
     /// A recording begins.
     Opens,
     /// Rows of an entity of a recording.
-    Chunk(StoreId, Chunk),
+    Chunk(StoreId, Box<Chunk>),
     /// The blueprint, which is for the viewer.
     Layout,
 }
@@ -111,7 +111,7 @@ impl Stream {
                     let arrow = arrow.to_application(()).map_err(|e| e.to_string())?;
                     Chunk::from_arrow_msg(&arrow).map_err(|e| e.to_string())
                 });
-                Ok(Some(Message::Chunk(store, chunk.map_err(at)?)))
+                Ok(Some(Message::Chunk(store, Box::new(chunk.map_err(at)?))))
             }
             Some(Msg::SetStoreInfo(opening)) => {
                 let store = opening.info.and_then(|info| info.store_id);

@@ -91,6 +91,15 @@ impl SceneFields {
             self.file = None;
             self.file_blake3 = None;
         }
+        if flags.file.is_some() {
+            // A start file brings these with it.
+            self.particles = None;
+            self.phi = None;
+            self.aspect = None;
+            self.species = None;
+            self.spread = None;
+            self.seed = None;
+        }
         macro_rules! first_of {
             ($($field:ident),*) => { Self { $($field: flags.$field.or(self.$field)),* } };
         }

@@ -146,7 +146,7 @@ pub struct Scene {
     pub seed: u64,
     /// Line tension γ (force), positive. Default 1, which makes γ the unit of force.
     pub line_tension: f64,
-    /// The run has converged when `f_max` (units of γ) is not above this; positive. Default 1e-10.
+    /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10.
     pub threshold: f64,
     /// The run ends at this step in any case. Default 200 000.
     pub steps: u64,
@@ -313,10 +313,7 @@ impl Scene {
             blake3: hash @ None,
         } = &mut self.start
         {
-            let bytes = std::fs::read(&*path).map_err(|source| SceneError::Read {
-                path: path.clone(),
-                source,
-            })?;
+            let bytes = start::read_file(path)?;
             *hash = Some(blake3::hash(&bytes).to_hex().to_string());
         }
         Ok(self)

@@ -60,6 +60,7 @@ impl Schedule {
         match self {
             Self::Off => None,
             Self::Every(k) => (step / k.max(1)).checked_add(1)?.checked_mul(k.max(1)),
+            Self::Log(_) if step == 0 => Some(1),
             Self::Log(per_decade) => {
                 // From just below the next mark; a step so large that marks are no whole steps has no successor.
                 let n = f64::from(per_decade);
@@ -202,6 +203,7 @@ mod tests {
             }
         }
         assert_eq!(Schedule::Log(20).after(u64::MAX - 1), None);
-        assert_eq!(Schedule::Every(3).after(u64::MAX - 1), None);
+        assert_eq!(Schedule::Every(3).after(u64::MAX - 1), Some(u64::MAX));
+        assert_eq!(Schedule::Every(10).after(u64::MAX - 1), None);
     }
 }

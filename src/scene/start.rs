@@ -10,6 +10,7 @@ use crate::packing::Packing;
 use core::f64::consts::PI;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::io::Read as _;
 
 /// The packing that a scene starts from, its disks not yet relaxed.
 ///
@@ -203,15 +204,15 @@ impl Random {
 /// # std::fs::remove_file(&path).unwrap();
 /// ```
 pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-        path: path.into(),
-        source,
-    })?;
+    let bytes = read_file(path)?;
     let wrong = |line: u64, problem: String| SceneError::StartFile {
         path: path.into(),
         line,
         problem,
     };
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(wrong(0, format!("it is longer than {LARGEST_FILE} bytes")));
+    }
     let found = blake3::hash(&bytes).to_hex();
     if let Some(asked) = blake3
         && !asked.eq_ignore_ascii_case(&found)
@@ -224,6 +225,7 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
         ));
     }
     let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let domain = csv_box(text).map_err(|(line, problem)| wrong(line, problem))?;
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
@@ -256,6 +258,21 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
         ));
     }
     Ok(packing)
+}
+
+/// A start file of the largest packing is about half as long.
+const LARGEST_FILE: u64 = 1 << 30;
+
+/// The bytes of a start file, one more than [`LARGEST_FILE`] at most.
+pub(super) fn read_file(path: &str) -> Result<Vec<u8>, SceneError> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|source| SceneError::Read {
+            path: path.into(),
+            source,
+        })?;
+    Ok(bytes)
 }
 
 /// The sides of the box from the comment `# box = L_x, L_y`.

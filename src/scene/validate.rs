@@ -1,6 +1,7 @@
 //! The allowed ranges.
 
 use super::{Radii, Scene, SceneError, Start};
+use crate::contact::solver::Method;
 
 impl Scene {
     /// Checks every field, whatever way the scene was made.
@@ -158,7 +159,14 @@ impl Scene {
         } else {
             0
         };
-        particles as u64 * (4_000 + 24 * 4 * vertices)
+        let n = particles as u64;
+        let dense = if self.contact_solver == Method::GaussJordan {
+            // The dense matrix of some 2.5 N contacts.
+            50 * n * n
+        } else {
+            0
+        };
+        n * (4_000 + 24 * 4 * vertices) + dense
     }
 }
 

@@ -13,6 +13,7 @@ usage: check_recording.py RUN.rrd [--every K]      (pip install rerun-sdk==0.36.
 
 import argparse
 import sys
+import tomllib
 
 import numpy as np
 import rerun.experimental as rerun
@@ -30,6 +31,9 @@ class Recording:
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch = chunk.to_record_batch()
             entity = str(chunk.entity_path)
+            if "softjam.Scene:toml" in batch.schema.names:
+                scene = tomllib.loads(batch["softjam.Scene:toml"][0][0].as_py())
+                self.line_tension = scene["line_tension"]
             if entity == "/particles":
                 self.radii = batch["softjam.Particles:radius"][0].values.to_numpy()
                 self.box = batch["softjam.Particles:box"][0].values.to_numpy()
@@ -136,10 +140,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("path")
     parser.add_argument("--every", type=int, default=1)
-    parser.add_argument("--line-tension", type=float, default=1.0)
     arguments = parser.parse_args()
-    gamma = arguments.line_tension
     recording = Recording(arguments.path)
+    gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
     worst = dict.fromkeys(("eq4", "gap", "force", "f_max", "pressure", "energy", "contour"), 0.0)
@@ -152,7 +155,7 @@ def main():
         worst["force"] = max(worst["force"], -found["force"])
         for name in ("f_max", "pressure", "energy"):
             recorded = recording.metrics[name][step]
-            worst[name] = max(worst[name], abs(found[name] - recorded))
+            worst[name] = max(worst[name], abs(found[name] / gamma - recorded))
         if step in recording.contours:
             strips = recording.contours[step]
             vertices += sum(len(s) for s in strips)

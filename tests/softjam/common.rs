@@ -8,6 +8,7 @@ use softjam::packing::Packing;
 use softjam::relax::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Species};
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// SplitMix64 (Steele, Lea, Flood 2014): random enough for a test, and not the crate's generator.
 pub struct Random(u64);
@@ -154,4 +155,29 @@ pub fn largest_difference(a: &[([u32; 2], f64)], b: &[([u32; 2], f64)]) -> f64 {
 pub fn median(mut values: Vec<u64>) -> u64 {
     values.sort_unstable();
     values[values.len() / 2]
+}
+
+/// A folder of the test's own, gone when it is dropped.
+pub struct Folder(std::path::PathBuf);
+
+impl Folder {
+    pub fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = format!("softjam-test-{}-{number}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::create_dir(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    pub fn path(&self) -> &std::path::Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What cannot be removed is left to the system's own cleaning.
+        drop(std::fs::remove_dir_all(&self.0));
+    }
 }

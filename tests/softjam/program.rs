@@ -1,22 +1,21 @@
 //! The program at its process boundary: exit codes, files, messages.
 
-use assert_cmd::Command;
+use crate::common::Folder;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
-fn softjam() -> Command {
-    Command::new(assert_cmd::cargo::cargo_bin!("softjam"))
-}
+/// The program under test.
+const SOFTJAM: &str = env!("CARGO_BIN_EXE_softjam");
 
-fn folder() -> TempDir {
-    TempDir::new().expect("a temporary folder")
+fn folder() -> Folder {
+    Folder::new()
 }
 
 /// Runs `softjam` with `arguments`; returns exit code, standard output and standard error.
 fn run(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let output = softjam()
+    let output = Command::new(SOFTJAM)
         .current_dir(folder)
         .args(arguments)
         .output()
@@ -198,9 +197,8 @@ fn a_step_limit_that_comes_first_exits_with_3() {
 #[test]
 fn an_interrupted_run_leaves_a_readable_recording() {
     let folder = folder();
-    let program = assert_cmd::cargo::cargo_bin!("softjam");
     for signal in ["INT", "TERM"] {
-        let mut child = std::process::Command::new(program)
+        let mut child = Command::new(SOFTJAM)
             .current_dir(folder.path())
             .args([
                 "record",
@@ -211,7 +209,7 @@ fn an_interrupted_run_leaves_a_readable_recording() {
                 "-o",
                 signal,
             ])
-            .stdout(std::process::Stdio::piped())
+            .stdout(Stdio::piped())
             .spawn()
             .expect("softjam starts");
         // Wait until the first batch has reached the file.
@@ -224,7 +222,7 @@ fn an_interrupted_run_leaves_a_readable_recording() {
             );
             std::thread::sleep(Duration::from_millis(20));
         }
-        let kill = std::process::Command::new("kill")
+        let kill = Command::new("kill")
             .args(["-s", signal, &child.id().to_string()])
             .status();
         assert!(kill.expect("kill runs").success());
@@ -493,12 +491,11 @@ fn a_killed_run_is_verified_as_far_as_it_goes_and_can_be_finished() {
     let flags = ["-N", "256", "--phi", "0.9", "--every", "1"];
     let whole = [&["record", "-o", "whole.rrd"][..], &flags].concat();
     assert_eq!(run(folder.path(), &whole).0, Some(0));
-    let program = assert_cmd::cargo::cargo_bin!("softjam");
-    let mut child = std::process::Command::new(program)
+    let mut child = Command::new(SOFTJAM)
         .current_dir(folder.path())
         .args(["record", "-o", "killed.rrd"])
         .args(flags)
-        .stdout(std::process::Stdio::null())
+        .stdout(Stdio::null())
         .spawn()
         .expect("softjam starts");
     let file = folder.path().join("killed.rrd");

@@ -1,5 +1,6 @@
 //! Recordings: what goes in comes out, damage is noticed, failures are reported where they happen.
 
+use crate::common::Folder;
 use softjam::frame::Frame;
 use softjam::record::{self, Header, RrdRecorder, Snapshot, Writer};
 use softjam::relax::{Relaxation, Status};
@@ -38,7 +39,7 @@ fn states(path: &Path) -> Vec<Frame> {
 
 #[test]
 fn recorded_frames_come_back_with_the_bits_they_went_in_with() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     let path = folder.path().join("a.rrd");
     let scene = scene();
     record_to(&path, &scene);
@@ -63,7 +64,7 @@ fn recorded_frames_come_back_with_the_bits_they_went_in_with() {
 
 #[test]
 fn a_run_resumed_from_any_recorded_frame_ends_in_the_same_bits() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     let path = folder.path().join("a.rrd");
     let scene = scene();
     record_to(&path, &scene);
@@ -83,7 +84,7 @@ fn a_run_resumed_from_any_recorded_frame_ends_in_the_same_bits() {
 
 #[test]
 fn the_result_names_the_digest_over_all_recorded_states() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     let path = folder.path().join("a.rrd");
     record_to(&path, &scene());
     let mut hash = blake3::Hasher::new();
@@ -103,7 +104,7 @@ fn the_result_names_the_digest_over_all_recorded_states() {
 
 #[test]
 fn a_changed_position_is_noticed_by_its_digest() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     let path = folder.path().join("a.rrd");
     record_to(&path, &scene());
     let frames = states(&path);
@@ -131,7 +132,7 @@ fn a_changed_position_is_noticed_by_its_digest() {
 
 #[test]
 fn other_files_are_told_apart_from_recordings() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     let open = |bytes: &[u8]| {
         let path = folder.path().join("x.rrd");
         std::fs::write(&path, bytes).expect("written");

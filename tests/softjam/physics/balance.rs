@@ -56,20 +56,20 @@ fn last_frame_is_in_balance_by_an_independent_solution_of_the_contact_problem() 
         let overlap = -model.smallest_gap_elsewhere();
         assert_at_most("overlap of pairs that are not in contact", overlap, 1e-12);
         assert_at_most(
-            "f_max recomputed",
-            model.largest_net_force(),
+            "f_max recomputed, units of γ",
+            model.largest_net_force() / scene.line_tension,
             scene.threshold + 1e-12,
         );
 
         let o = run.observables();
         assert_at_most(
             "energy, relative error",
-            (o.energy / model.energy() - 1.0).abs(),
+            (o.energy * scene.line_tension / model.energy() - 1.0).abs(),
             1e-11,
         );
         assert_at_most(
             "pressure, relative error",
-            (o.pressure() / model.pressure() - 1.0).abs(),
+            (o.pressure() * scene.line_tension / model.pressure() - 1.0).abs(),
             1e-11,
         );
     }
@@ -87,7 +87,7 @@ fn energy_is_the_maximum_of_the_dual_problem() {
         let terms = forces.iter().zip(contacts.overlaps).zip(&image);
         terms.map(|((f, d), q)| f * (d - 0.5 * q)).sum::<f64>()
     };
-    let energy = Observables::of(&contacts, packing.domain(), 64, 0.0, 0.0).energy;
+    let energy = Observables::of(&contacts, packing.domain(), 64, 1.0, (0.0, 0.0)).energy;
     assert!((dual(contacts.forces) / energy - 1.0).abs() < 1e-12);
     let mut random = Random::new(2);
     for _ in 0..100 {
@@ -132,7 +132,13 @@ fn rescaled(packing: &Packing, scale: f64) -> Packing {
 fn observables(packing: &Packing) -> Observables {
     let mut law = law(Rule::Complementarity, Method::SparseCholesky);
     law.solve(packing, &[], &[]).unwrap();
-    Observables::of(&law.contacts(), packing.domain(), packing.len(), 0.0, 0.0)
+    Observables::of(
+        &law.contacts(),
+        packing.domain(),
+        packing.len(),
+        1.0,
+        (0.0, 0.0),
+    )
 }
 
 #[test]

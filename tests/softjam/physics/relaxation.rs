@@ -179,3 +179,33 @@ fn disturbed_crystal_of_equal_particles_relaxes_back() {
     let worst = largest_difference(&answer(run.law()), &answer(at_rest.law()));
     assert_at_most("force after the disturbance, difference", worst, 1e-8);
 }
+
+#[test]
+fn the_line_tension_is_the_unit_of_force_and_changes_nothing_else() {
+    let run_at = |line_tension: f64| {
+        let scene = Scene {
+            line_tension,
+            ..scene(64, 0.9, 3)
+        };
+        let mut run = Relaxation::new(&scene).unwrap();
+        while run.status() == Status::Running {
+            run.advance().unwrap();
+        }
+        assert_eq!(run.status(), Status::Converged);
+        (run.step(), run.disks(), run.observables())
+    };
+    let (steps, disks, at_one) = run_at(1.0);
+    // Powers of four: forces scale by them and times by their roots, both without rounding.
+    for line_tension in [0.25, 4.0, 2f64.powi(-40), 2f64.powi(30)] {
+        let (other_steps, other_disks, other) = run_at(line_tension);
+        assert_eq!(
+            (steps, disks),
+            (other_steps, other_disks),
+            "γ = {line_tension}"
+        );
+        assert_eq!(other.f_max, at_one.f_max);
+        assert_eq!(other.energy, at_one.energy);
+        assert_eq!(other.stress, at_one.stress);
+        assert_eq!(other.dt * line_tension.sqrt(), at_one.dt);
+    }
+}

@@ -7,7 +7,7 @@ use softjam::scene::{Scene, SceneError, Start};
 
 /// What a scene that starts from a file of these bytes says.
 fn complaint(bytes: &[u8]) -> String {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = crate::common::Folder::new();
     let path = folder.path().join("start.csv");
     std::fs::write(&path, bytes).unwrap();
     let path = path.to_str().unwrap();
@@ -50,7 +50,7 @@ fn assert_all_refused(before: &str, table: &str, after: &str) {
 
 #[test]
 fn well_formed_start_file_is_read_and_wrapped() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = crate::common::Folder::new();
     let path = folder.path().join("start.csv");
     let text =
         "# made by hand\n# box = 6.5, 7\n x , y , radius\n# a comment\n-1, 8.5, 0.5\n2,1,0.7\n";
@@ -152,7 +152,7 @@ fn file_that_is_missing_is_named() {
 
 #[test]
 fn file_with_another_hash_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = crate::common::Folder::new();
     let path = folder.path().join("start.csv");
     std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n").unwrap();
     let path = path.to_str().unwrap();
