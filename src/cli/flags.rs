@@ -78,6 +78,9 @@ const PACKING: &str = "Packing";
 const RELAXATION: &str = "Relaxation";
 pub const RECORDING: &str = "Recording";
 
+/// The place of the metrics among the channels.
+const METRICS: usize = 2;
+
 /// The channels of `--channels`, with a schedule where one is given.
 type ChannelList = Vec<(usize, Option<Schedule>)>;
 
@@ -158,7 +161,6 @@ impl SceneFlags {
                 value: k.to_string(),
                 allowed: "every ≥ 1 (steps)".to_owned(),
             })?;
-            const METRICS: usize = 2;
             for (k, (_, schedule)) in channels.named().into_iter().enumerate() {
                 if k != METRICS && schedule.is_on() && !explicit(k) {
                     *channel(&mut channels, k) = Schedule::Every(every);

@@ -29,6 +29,8 @@ struct Findings {
     channels: BTreeMap<String, (u64, u64, u64)>,
     /// The last value of each metric.
     metrics: BTreeMap<String, f64>,
+    /// Step and digest of the last state.
+    last: Option<(u64, [u8; 32])>,
     result: Option<Outcome>,
     damage: Option<ReadError>,
 }
@@ -38,7 +40,10 @@ impl Findings {
         let mut found = Self::default();
         for event in recording {
             let (channel, step) = match event {
-                Ok(Event::State(frame)) => ("state", frame.step),
+                Ok(Event::State(frame)) => {
+                    found.last = Some((frame.step, frame.digest()));
+                    ("state", frame.step)
+                }
                 Ok(Event::Drawn { channel, step }) => (channel, step),
                 Ok(Event::Metric { name, step, value }) => {
                     let first_seen = name == "f_max";
@@ -139,10 +144,18 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         };
         line("state", none.to_owned());
     }
+    if let Some((step, digest)) = found.last {
+        line("digest", format!("{} (state of step {step})", hex(digest)));
+    }
     for (name, value) in &found.metrics {
         line(name, format!("{value:.6e}"));
     }
     text
+}
+
+/// BLAKE3 in hexadecimal, as `b3sum` writes it.
+fn hex(digest: [u8; 32]) -> String {
+    blake3::Hash::from_bytes(digest).to_hex().to_string()
 }
 
 fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
@@ -165,6 +178,7 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
         "steps": found.result.map(|r| r.steps),
         "f_max": found.result.map(|r| r.f_max),
         "channels": channels,
+        "digest": found.last.map(|(_, digest)| hex(digest)),
         "metrics": found.metrics,
         "damage": found.damage.as_ref().map(ToString::to_string),
         "scene": recording.scene().to_toml(),

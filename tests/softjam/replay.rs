@@ -68,6 +68,9 @@ fn states(bytes: &[u8]) -> Vec<Frame> {
         .collect()
 }
 
+/// What is done to a snapshot on its way to the recorder.
+type Forge = fn(&mut Snapshot);
+
 const WAYS: [Way; 3] = [Way::Whole, Way::Segments(1), Way::Segments(3)];
 
 #[test]
@@ -107,7 +110,7 @@ fn a_frame_that_the_run_did_not_give_is_found_and_named() {
 
 #[test]
 fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
-    let forgeries: [(&str, fn(&mut Snapshot)); 4] = [
+    let forgeries: [(&str, Forge); 4] = [
         ("metric pressure", |s| {
             if let Some(o) = &mut s.metrics
                 && s.step == 33
@@ -307,7 +310,7 @@ fn flipped_bits_anywhere_never_panic() {
     let mut random = Random::new(5);
     for _ in 0..2000 {
         let mut copy = bytes.clone();
-        for _ in 0..1 + random.below(4) {
+        for _ in 0..=random.below(4) {
             let place = random.below(copy.len());
             copy[place] ^= 1 << random.below(8);
         }
