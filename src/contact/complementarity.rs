@@ -3,7 +3,7 @@
 //! # The way to the answer
 //!
 //! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set
-//! with a negative gap ought to come. [`Rule::Complementarity`] exchanges them all at once and solves again, which
+//! with a negative gap ought to come. [`Rule::Complementarity`](super::Rule::Complementarity) exchanges them all at once and solves again, which
 //! takes one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
@@ -18,144 +18,17 @@
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
-use super::Contacts;
-use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry};
-use super::solver::{LinearSolver, Method, SolverError};
+use super::law::{ContactError, ContactLaw};
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
-use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 use core::f64::consts::PI;
-
-/// How the contact list follows the positions.
-///
-/// ```
-/// assert_eq!(softjam::contact::Rule::default(), softjam::contact::Rule::Complementarity);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Rule {
-    /// The contact law is solved in every step: forces and gaps are ≥ 0 and the list depends on the positions alone.
-    #[default]
-    Complementarity,
-    /// Saitoh 2.2.5: in every step solve, drop the contacts with `f < 0`, add the pairs with `Δ > 0`, solve once more. The
-    /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
-    /// exceed the solver's tolerance.)
-    Seed,
-}
-
-/// Why the contact problem has no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ContactError {
-    /// `A f = δ` was not solved.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// A particle reaches so far that it could touch two images of the same neighbour.
-    #[error(
-        "particle {particle} reaches {reach:.4} (radius and largest bulge), more than a quarter of the box's shorter side \
-         {shortest:.4}: it could touch two images of one neighbour; take more particles or a lower phi"
-    )]
-    BoxTooSmall {
-        /// The particle.
-        particle: usize,
-        /// Its undeformed radius and the bound of its bulge (length).
-        reach: f64,
-        /// The shorter side of the box (length).
-        shortest: f64,
-    },
-    /// The forces are so large that a contour would bulge by several radii.
-    #[error(
-        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces are absurd, \
-         as after a step that was too long or in a start that overlaps far too much"
-    )]
-    Absurd {
-        /// The particle.
-        particle: usize,
-        /// The bound of its bulge (length).
-        bulge: f64,
-        /// Its undeformed radius (length).
-        radius: f64,
-    },
-    /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
-    #[error(
-        "the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps"
-    )]
-    Unsettled {
-        /// Pairs that still break the law.
-        offending: usize,
-        /// Contacts in the set.
-        contacts: usize,
-        /// Sweeps done.
-        sweeps: usize,
-    },
-}
-
-/// The contact law: a solver of the contact problem with its settings, its buffers and its last answer.
-///
-/// # Example
-///
-/// A particle pressed between two others bulges sideways and touches a fourth that no undeformed disk would reach:
-///
-/// ```
-/// use softjam::contact::ContactLaw;
-/// use softjam::domain::{Domain, Vec2};
-/// use softjam::packing::Packing;
-///
-/// let packing = Packing::new(
-///     Domain::new(9.0, 9.0).unwrap(),
-///     vec![0.5; 4],
-///     vec![Vec2::new(3.0, 3.0), Vec2::new(3.9, 3.0), Vec2::new(4.8, 3.0), Vec2::new(3.9, 4.005)],
-/// ).unwrap();
-/// let mut law = ContactLaw::default();
-/// law.solve(&packing, &[], &[]).unwrap();
-/// assert_eq!(law.contacts().pairs, [[0, 1], [1, 2], [1, 3]]);
-/// assert!(law.contacts().overlaps[2] < 0.0 && law.contacts().forces[2] > 0.0);
-/// assert!(law.residual() < 1e-12);
-/// ```
-#[derive(Clone, Debug)]
-pub struct ContactLaw {
-    rule: Rule,
-    line_tension: f64,
-    tolerance: f64,
-    solver: LinearSolver,
-    neighbors: NeighborList,
-    list: ContactList,
-    geometry: Geometry,
-    matrix: ContactMatrix,
-    pairs: Vec<[u32; 2]>,
-    forces: Vec<f64>,
-    image: Vec<f64>,
-    bulges: Vec<f64>,
-    offending: Vec<Offence>,
-    next: (Vec<[u32; 2]>, Vec<f64>),
-    residual: f64,
-    work: Work,
-}
-
-/// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
-///
-/// ```
-/// assert_eq!(softjam::contact::ContactLaw::default().work().solves, 0);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
-    /// Contact problems solved.
-    pub solves: u64,
-    /// Linear systems set up and solved.
-    pub sweeps: u64,
-    /// Iterations of the linear solver.
-    pub iterations: u64,
-    /// Gaps evaluated of pairs outside the set.
-    pub gaps: u64,
-}
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 const WIDEST_BULGE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Offence {
+pub(super) enum Offence {
     /// Contact number `.0` pulls.
     Drop(usize, [u32; 2]),
     /// This pair overlaps and has no force; `.1` is a first guess of it.
@@ -170,206 +43,9 @@ impl Offence {
     }
 }
 
-impl Default for ContactLaw {
-    fn default() -> Self {
-        Self::new(Rule::default(), Method::default(), 1.0, 1e-12)
-    }
-}
-
 impl ContactLaw {
-    /// A law with line tension γ (force, positive) and a `tolerance` on the residual relative to the largest overlap.
-    ///
-    /// ```
-    /// use softjam::contact::{solver::Method, ContactLaw, Rule};
-    /// let law = ContactLaw::new(Rule::Complementarity, Method::SparseCholesky, 1.0, 1e-12);
-    /// assert!(law.contacts().pairs.is_empty());
-    /// ```
-    #[must_use]
-    pub fn new(rule: Rule, method: Method, line_tension: f64, tolerance: f64) -> Self {
-        Self {
-            rule,
-            line_tension,
-            tolerance,
-            solver: LinearSolver::new(method),
-            neighbors: NeighborList::new(),
-            list: ContactList::default(),
-            geometry: Geometry::default(),
-            matrix: ContactMatrix::default(),
-            pairs: Vec::new(),
-            forces: Vec::new(),
-            image: Vec::new(),
-            bulges: Vec::new(),
-            offending: Vec::new(),
-            next: (Vec::new(), Vec::new()),
-            residual: 0.0,
-            work: Work::default(),
-        }
-    }
-
-    /// The contacts and forces found last.
-    ///
-    /// ```
-    /// assert!(softjam::contact::ContactLaw::default().contacts().forces.is_empty());
-    /// ```
-    #[must_use]
-    pub fn contacts(&self) -> Contacts<'_> {
-        Contacts {
-            pairs: &self.pairs,
-            normals: self.geometry.normals(),
-            distances: self.geometry.distances(),
-            overlaps: self.geometry.overlaps(),
-            forces: &self.forces,
-        }
-    }
-
-    /// The matrix `A` of the contacts found last.
-    ///
-    /// ```
-    /// assert!(softjam::contact::ContactLaw::default().matrix().is_empty());
-    /// ```
-    #[must_use]
-    pub fn matrix(&self) -> &ContactMatrix {
-        &self.matrix
-    }
-
-    /// Line tension γ (force).
-    ///
-    /// ```
-    /// assert_eq!(softjam::contact::ContactLaw::default().line_tension(), 1.0);
-    /// ```
-    #[must_use]
-    pub fn line_tension(&self) -> f64 {
-        self.line_tension
-    }
-
-    /// Solves `A x = b` with the matrix found last, from the guess in `x`, to `max |A x − b| ≤ tolerance`.
-    ///
-    /// # Errors
-    ///
-    /// [`ContactError::Solver`].
-    ///
-    /// ```
-    /// assert!(softjam::contact::ContactLaw::default().solve_linear(&[], &mut [], 0.0).is_ok());
-    /// ```
-    pub fn solve_linear(
-        &mut self,
-        b: &[f64],
-        x: &mut [f64],
-        tolerance: f64,
-    ) -> Result<(), ContactError> {
-        self.solver.solve(&self.matrix, b, x, tolerance)?;
-        Ok(())
-    }
-
-    /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
-    pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
-        self.forces.clear();
-        self.forces.extend_from_slice(forces);
-        self.assemble(packing);
-        self.inspect(packing);
-    }
-
-    /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
-    /// of `|A f − δ|` on contacts, of `−gap` elsewhere and of `−f A_cc`.
-    ///
-    /// ```
-    /// assert_eq!(softjam::contact::ContactLaw::default().residual(), 0.0);
-    /// ```
-    #[must_use]
-    pub fn residual(&self) -> f64 {
-        self.residual
-    }
-
-    /// The residual below which the law counts as fulfilled, in the same measure.
-    ///
-    /// Sixteen tolerances: a linear system solved to the tolerance leaves gaps and forces uncertain by about the
-    /// condition number of `A`, some 6 of them.
-    ///
-    /// ```
-    /// let law = softjam::contact::ContactLaw::default();
-    /// assert!(law.residual() <= law.accepted_residual());
-    /// ```
-    #[must_use]
-    pub fn accepted_residual(&self) -> f64 {
-        16.0 * self.tolerance
-    }
-
-    /// What it has cost so far.
-    ///
-    /// ```
-    /// assert_eq!(softjam::contact::ContactLaw::default().work(), Default::default());
-    /// ```
-    #[must_use]
-    pub fn work(&self) -> Work {
-        self.work
-    }
-
-    /// Solves the contact problem at the positions of `packing`, starting from contacts and forces of a step before.
-    ///
-    /// `pairs` ascend, `forces` are in the same order; both may be empty. With [`Rule::Complementarity`] the start
-    /// decides only how fast the answer is found (and its last bits, within the tolerance).
-    ///
-    /// # Errors
-    ///
-    /// [`ContactError`]; the law's last answer is then of no use.
-    ///
-    /// # Panics
-    ///
-    /// If `pairs` names a particle that the packing lacks or the slices differ in length.
-    ///
-    /// See the example of [`ContactLaw`].
-    pub fn solve(
-        &mut self,
-        packing: &Packing,
-        pairs: &[[u32; 2]],
-        forces: &[f64],
-    ) -> Result<(), ContactError> {
-        assert_eq!(pairs.len(), forces.len(), "one force a contact");
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
-        self.forces.clear();
-        self.forces.extend_from_slice(forces);
-        self.solve_again(packing)
-    }
-
-    /// [`solve`](Self::solve), starting from the contacts and forces found last.
-    ///
-    /// # Errors
-    ///
-    /// As [`solve`](Self::solve).
-    ///
-    /// ```
-    /// # use softjam::contact::ContactLaw;
-    /// # use softjam::{domain::{Domain, Vec2}, packing::Packing};
-    /// # let at = |x| Vec2::new(x, 2.0);
-    /// # let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
-    /// let mut law = ContactLaw::default();
-    /// law.solve(&packing, &[], &[]).unwrap();
-    /// let iterations = law.work().iterations;
-    /// law.solve_again(&packing).unwrap();
-    /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
-    /// ```
-    pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
-        self.work.solves += 1;
-        match self.rule {
-            Rule::Complementarity => self.settle(packing)?,
-            Rule::Seed => {
-                self.sweep(packing)?;
-                self.exchange(self.offending.len());
-                self.sweep(packing)?;
-            }
-        }
-        // The forces of an unfinished exchange can be anything; only an answer is held against the box.
-        if self.residual <= self.accepted_residual() {
-            self.check_images(packing)?;
-        }
-        Ok(())
-    }
-
     /// Exchanges contacts until none offends.
-    fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
+    pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
         let mut best = usize::MAX;
@@ -399,7 +75,7 @@ impl ContactLaw {
     }
 
     /// Forces of the present set, and the pairs that offend, in the order of the list.
-    fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
+    pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         let scale = self.assemble(packing);
         let iterations = self.solver.solve(
@@ -414,7 +90,7 @@ impl ContactLaw {
     }
 
     /// Geometry and matrix of the present set; returns the largest `|δ|`, the scale of all residuals.
-    fn assemble(&mut self, packing: &Packing) -> f64 {
+    pub(super) fn assemble(&mut self, packing: &Packing) -> f64 {
         self.list.rebuild(packing.len(), &self.pairs);
         self.geometry.rebuild(packing, &self.list);
         self.matrix
@@ -428,7 +104,7 @@ impl ContactLaw {
     }
 
     /// Measures how far the present forces are from the contact law, and lists the pairs that offend.
-    fn inspect(&mut self, packing: &Packing) {
+    pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
         self.image.resize(self.forces.len(), 0.0);
         self.matrix.multiply(&self.forces, &mut self.image);
@@ -450,29 +126,34 @@ impl ContactLaw {
             self.bulges[i as usize] += bulge;
             self.bulges[j as usize] += bulge;
         }
+        // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
+        let widest = WIDEST_BULGE * packing.largest_radius();
         let mut largest: f64 = 0.0;
-        for (bulge, radius) in self.bulges.iter_mut().zip(packing.radii()) {
+        self.absurd = None;
+        for (particle, (bulge, radius)) in self.bulges.iter_mut().zip(packing.radii()).enumerate() {
             *bulge *= radius / (2.0 * PI * self.line_tension);
+            if bulge.is_nan() || *bulge > widest {
+                self.absurd.get_or_insert((particle, *bulge));
+                *bulge = widest;
+            }
             largest = largest.max(*bulge);
         }
-        // The forces of an unfinished exchange can be anything; pairs beyond this reach are left to a later sweep.
-        let radius = packing.largest_radius();
-        let margin = 2.0 * largest.min(WIDEST_BULGE * radius);
-        let skin = 0.3 * radius;
-        self.neighbors.update(packing, margin, skin + 0.5 * margin);
+        let skin = 0.3 * packing.largest_radius();
+        self.neighbors
+            .update(packing, 2.0 * largest, skin + largest);
     }
 
     /// Two images of one neighbour are at least half a side apart: no particle may reach farther than a quarter.
-    fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
+    pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
+        if let Some((particle, bulge)) = self.absurd {
+            return Err(ContactError::Absurd {
+                particle,
+                bulge,
+                radius: packing.radii()[particle],
+            });
+        }
         let shortest = packing.domain().shortest();
         for (particle, (bulge, radius)) in self.bulges.iter().zip(packing.radii()).enumerate() {
-            if bulge.is_nan() || *bulge > WIDEST_BULGE * packing.largest_radius() {
-                return Err(ContactError::Absurd {
-                    particle,
-                    bulge: *bulge,
-                    radius: *radius,
-                });
-            }
             let reach = radius + bulge;
             if 4.0 * reach > shortest {
                 return Err(ContactError::BoxTooSmall {
@@ -535,7 +216,7 @@ impl ContactLaw {
     }
 
     /// Exchanges the first `count` offending pairs between the two sides.
-    fn exchange(&mut self, count: usize) {
+    pub(super) fn exchange(&mut self, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
         let (pairs, forces) = &mut self.next;
         pairs.clear();

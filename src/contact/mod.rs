@@ -21,11 +21,12 @@
 //! added behind it.
 
 pub mod complementarity;
+mod law;
 pub mod list;
 pub mod matrix;
 pub mod solver;
 
-pub use complementarity::{ContactError, ContactLaw, Rule};
+pub use law::{ContactError, ContactLaw, Rule, Work};
 
 use crate::domain::Vec2;
 use crate::frame::Frame;

@@ -18,6 +18,7 @@
 
 mod blueprint;
 mod encode;
+mod pictures;
 mod rrd;
 mod writer;
 
