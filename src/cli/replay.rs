@@ -2,11 +2,9 @@
 
 use super::{Verdict, print};
 use clap::ValueEnum;
-use softjam::frame::Frame;
-use softjam::packing::Packing;
 use softjam::record::Outcome;
 use softjam::replay::{
-    Balance, Comparison, Determinism, Event, Recording, ReplayError, Way, Worst, compare,
+    Balance, Comparison, Determinism, Recording, ReplayError, State, Way, Worst, compare,
     determinism,
 };
 use std::fmt::Write as _;
@@ -95,26 +93,41 @@ fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
         Way::Whole
     };
     // Frames are judged on a thread of their own while the run goes on.
-    let (queue, frames) = sync_channel::<(Packing, Frame)>(FRAMES_WAITING);
+    let (queue, frames) = sync_channel::<State>(FRAMES_WAITING);
     let (found, balance) = std::thread::scope(|scope| {
         let judge = scope.spawn(move || {
             balance.map(|mut balance| {
-                for (packing, frame) in frames {
-                    balance.check(&packing, &frame);
+                for State {
+                    frame,
+                    packing,
+                    metrics,
+                } in frames
+                {
+                    let metrics = metrics.get(&frame.step).map_or(&[][..], Vec::as_slice);
+                    balance.check(&packing, &frame, metrics);
                 }
                 balance
             })
         });
-        let post = move |packing: &Packing, frame: &Frame| {
+        let post = move |state: &State| {
             if wanted(Question::Balance) {
                 // The judge hangs up only by panicking, which is passed on below.
-                let _ = queue.send((packing.clone(), frame.clone()));
+                let _ = queue.send(state.clone());
             }
         };
         let found = if wanted(Question::Determinism) {
             determinism(&mut recording, way, post).map(Some)
         } else {
-            read_through(&mut recording, post).map(|()| None)
+            let end = loop {
+                match recording.next_state() {
+                    Ok(Some(state)) => post(&state),
+                    Ok(None) => break Ok(None),
+                    Err(error) => break Err(error.into()),
+                }
+            };
+            // The judge waits for the end of the queue.
+            drop(post);
+            end
         };
         let balance = judge
             .join()
@@ -138,19 +151,6 @@ fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
 
 /// Frames that may wait for the judge before the run does.
 const FRAMES_WAITING: usize = 8;
-
-/// Reads a recording to its end.
-fn read_through(
-    recording: &mut Recording,
-    mut watch: impl FnMut(&Packing, &Frame),
-) -> Result<(), ReplayError> {
-    while let Some(event) = recording.next() {
-        if let Event::State(frame) = event? {
-            watch(&recording.packing(&frame)?, &frame);
-        }
-    }
-    Ok(())
-}
 
 impl Findings {
     fn good(&self) -> bool {
@@ -211,6 +211,13 @@ impl Findings {
                 format!(
                     "against those found anew {} of the largest force",
                     at(&b.forces)
+                ),
+            );
+            line(
+                "observables",
+                format!(
+                    "energy and pressure {} relative",
+                    at(&b.energy_and_pressure)
                 ),
             );
             if b.pull.value > 0.0 {
@@ -275,6 +282,7 @@ impl Findings {
                 "overlap": worst(&b.overlap),
                 "pull": worst(&b.pull),
                 "forces": worst(&b.forces),
+                "energy_and_pressure": worst(&b.energy_and_pressure),
                 "contacts": worst(&b.contacts),
                 "f_max": b.last.map(|l| l.1),
                 "failed": b.failed.as_ref().map(|(step, e)| format!("step {step}: {e}")),

@@ -8,7 +8,7 @@ use crate::contact::list::ContactList;
 use crate::contact::matrix::{ContactMatrix, Geometry};
 use crate::contact::{ContactError, ContactLaw, FrameContacts, Rule};
 use crate::domain::Vec2;
-use crate::force::{largest_force, net_forces};
+use crate::force::{Observables, largest_force, net_forces};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::record::Outcome;
@@ -49,7 +49,7 @@ impl Worst {
 /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
 /// let mut balance = Balance::new(&scene);
-/// balance.check(run.packing(), &run.frame());
+/// balance.check(run.packing(), &run.frame(), &[("energy".to_owned(), run.observables().energy)]);
 /// assert!(balance.agrees());
 /// ```
 #[derive(Clone, Debug)]
@@ -65,6 +65,8 @@ pub struct Balance {
     pub pull: Worst,
     /// The largest difference between recorded forces and those of the contact problem solved anew.
     pub forces: Worst,
+    /// The largest relative difference between recorded energy, pressure and those of the contact problem solved anew.
+    pub energy_and_pressure: Worst,
     /// Pairs that are contacts on one side only.
     pub contacts: Worst,
     /// Frames seen.
@@ -97,6 +99,7 @@ impl Balance {
             overlap: Worst::default(),
             pull: Worst::default(),
             forces: Worst::default(),
+            energy_and_pressure: Worst::default(),
             contacts: Worst::default(),
             frames: 0,
             last: None,
@@ -104,14 +107,14 @@ impl Balance {
         }
     }
 
-    /// Looks at a frame; `packing` has its positions.
+    /// Looks at a frame; `packing` has its positions, `metrics` are those recorded at its step.
     ///
     /// # Panics
     ///
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
     ///
     /// See the example of [`Balance`].
-    pub fn check(&mut self, packing: &Packing, frame: &Frame) {
+    pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(String, f64)]) {
         let step = frame.step;
         self.frames += 1;
         let recorded = FrameContacts::of(packing, frame);
@@ -139,7 +142,10 @@ impl Balance {
         net_forces(&view, &mut net);
         self.last = Some((step, largest_force(&net) / self.law.line_tension()));
         match self.law.solve(packing, &[], &[]) {
-            Ok(()) => self.compare(view.pairs, view.forces, strongest, step),
+            Ok(()) => {
+                self.compare(view.pairs, view.forces, strongest, step);
+                self.compare_metrics(packing, metrics, step);
+            }
             Err(error) => self.failed = self.failed.take().or(Some((step, error))),
         }
     }
@@ -202,6 +208,30 @@ impl Balance {
         self.contacts.of(lonely as f64, step);
     }
 
+    /// Recorded energy and pressure against those of the contacts found anew.
+    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(String, f64)], step: u64) {
+        let (domain, gamma) = (packing.domain(), self.law.line_tension());
+        let anew = Observables::of(
+            &self.law.contacts(),
+            domain,
+            packing.len(),
+            gamma,
+            (0.0, 0.0),
+        );
+        for (name, recorded) in metrics {
+            let value = match name.as_str() {
+                "energy" => anew.energy,
+                "pressure" => anew.pressure(),
+                _ => continue,
+            };
+            let scale = value.abs().max(recorded.abs());
+            if scale > 0.0 || recorded.is_nan() {
+                self.energy_and_pressure
+                    .of((value - recorded).abs() / scale, step);
+            }
+        }
+    }
+
     /// Whether all frames seen fulfil the contact law to round-off. With the seed's rule contacts lag behind their
     /// positions by a step, so only the last frame is asked for: its step must not be among the worst.
     ///
@@ -217,6 +247,7 @@ impl Balance {
             && within(&self.overlap, ALLOWED)
             && within(&self.pull, 0.0)
             && within(&self.forces, ALLOWED)
+            && within(&self.energy_and_pressure, ALLOWED)
             && within(&self.contacts, 0.0)
     }
 
@@ -228,7 +259,7 @@ impl Balance {
     /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();
     /// let mut balance = Balance::new(&scene);
-    /// balance.check(run.packing(), &run.frame());
+    /// balance.check(run.packing(), &run.frame(), &[]);
     /// let claim = Outcome { converged: true, steps: 0, f_max: 0.0 };
     /// assert!(!balance.bears_out(&claim), "the first frame is far from balance");
     /// ```

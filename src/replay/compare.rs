@@ -1,7 +1,6 @@
 //! Two recordings, frame by frame.
 
-use super::{Difference, Event, ReadError, Recording};
-use crate::frame::Frame;
+use super::{Difference, ReadError, Recording};
 
 /// What a comparison of two recordings found.
 ///
@@ -42,35 +41,26 @@ pub struct Comparison {
 /// ```
 pub fn compare(here: &mut Recording, there: &mut Recording) -> Result<Comparison, ReadError> {
     let mut found = Comparison::default();
-    let (mut a, mut b) = (next_state(here)?, next_state(there)?);
+    let (mut a, mut b) = (here.next_state()?, there.next_state()?);
     loop {
         match (&a, &b) {
             (None, None) => return Ok(found),
-            (Some(x), Some(y)) if x.step == y.step => {
+            (Some(x), Some(y)) if x.frame.step == y.frame.step => {
                 found.common += 1;
                 if found.difference.is_none() {
-                    found.difference = Difference::between(x, y);
+                    found.difference = Difference::between(&x.frame, &y.frame);
                 }
-                a = next_state(here)?;
-                b = next_state(there)?;
+                a = here.next_state()?;
+                b = there.next_state()?;
             }
-            (Some(x), y) if y.as_ref().is_none_or(|y| x.step < y.step) => {
+            (Some(x), y) if y.as_ref().is_none_or(|y| x.frame.step < y.frame.step) => {
                 found.only_here += 1;
-                a = next_state(here)?;
+                a = here.next_state()?;
             }
             _ => {
                 found.only_there += 1;
-                b = next_state(there)?;
+                b = there.next_state()?;
             }
         }
     }
-}
-
-fn next_state(recording: &mut Recording) -> Result<Option<Frame>, ReadError> {
-    for event in recording {
-        if let Event::State(frame) = event? {
-            return Ok(Some(frame));
-        }
-    }
-    Ok(None)
 }

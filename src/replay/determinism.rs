@@ -5,13 +5,12 @@
 //! the next and the first frame is the scene's, the whole is the scene's. Recorded metrics are compared too, at every step.
 
 use super::difference::{self, Difference, What};
-use super::{Event, ReadError, Recording};
+use super::{Metrics, ReadError, Recording, State};
 use crate::force::Observables;
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation};
 use crate::scene::Scene;
-use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -60,9 +59,6 @@ pub enum ReplayError {
     },
 }
 
-/// The metrics of the steps behind the last state, by step.
-type Metrics = BTreeMap<u64, Vec<(String, f64)>>;
-
 /// The way from one recorded state to the next.
 struct Segment {
     /// The state before; `None` for the first.
@@ -71,8 +67,7 @@ struct Segment {
     metrics: Metrics,
 }
 
-/// Runs a recording again and compares it with what was recorded; `watch` sees every recorded state first, with
-/// the packing at it.
+/// Runs a recording again and compares it with what was recorded; `watch` sees every recorded state first.
 ///
 /// # Errors
 ///
@@ -91,7 +86,7 @@ struct Segment {
 /// # record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
 ///
 /// for way in [Way::Whole, Way::Segments(2)] {
-///     let verdict = determinism(&mut Recording::open(&path).unwrap(), way, |_, _| {}).unwrap();
+///     let verdict = determinism(&mut Recording::open(&path).unwrap(), way, |_| {}).unwrap();
 ///     assert_eq!(verdict.difference, None);
 /// }
 /// # std::fs::remove_file(&path).unwrap();
@@ -99,7 +94,7 @@ struct Segment {
 pub fn determinism(
     recording: &mut Recording,
     way: Way,
-    mut watch: impl FnMut(&Packing, &Frame),
+    mut watch: impl FnMut(&State),
 ) -> Result<Determinism, ReplayError> {
     let scene = recording.scene().clone();
     let mut verdict = Determinism::default();
@@ -147,49 +142,31 @@ fn earlier(a: Option<Difference>, b: Option<Difference>) -> Option<Difference> {
     }
 }
 
-/// Cuts the stream of events into segments and hands each to `check`, until one differs.
+/// Hands the way from each state to the next to `check`, until one differs.
 fn each_segment(
     recording: &mut Recording,
     verdict: &mut Determinism,
-    watch: &mut impl FnMut(&Packing, &Frame),
+    watch: &mut impl FnMut(&State),
     mut check: impl FnMut(Segment, Packing) -> Result<Option<Difference>, ReplayError>,
 ) -> Result<(), ReplayError> {
     let mut last: Option<Frame> = None;
-    let mut metrics = Metrics::new();
-    while let Some(event) = recording.next() {
-        match event? {
-            Event::State(frame) => {
-                let packing = recording.packing(&frame)?;
-                watch(&packing, &frame);
-                verdict.states += 1;
-                let first = verdict.steps.map_or(frame.step, |(first, _)| first);
-                verdict.steps = Some((first, frame.step));
-                let later = metrics.split_off(&(frame.step + 1));
-                let segment = Segment {
-                    from: last.replace(frame.clone()),
-                    to: frame,
-                    metrics: core::mem::replace(&mut metrics, later),
-                };
-                if verdict.difference.is_none() {
-                    verdict.difference = check(segment, packing)?;
-                }
-            }
-            Event::Metric { name, step, value } => {
-                verdict.metrics += 1;
-                // Metrics are compared on the way to a state; without states there is no way.
-                metrics.entry(step).or_default().push((name, value));
-                if verdict.states == 0 && metrics.len() > MOST_METRICS {
-                    metrics.clear();
-                }
-            }
-            Event::Drawn { .. } | Event::Result { .. } => {}
+    while let Some(state) = recording.next_state()? {
+        watch(&state);
+        let step = state.frame.step;
+        verdict.states += 1;
+        verdict.metrics += state.metrics.values().map(|m| m.len() as u64).sum::<u64>();
+        verdict.steps = Some((verdict.steps.map_or(step, |(first, _)| first), step));
+        let segment = Segment {
+            from: last.replace(state.frame.clone()),
+            to: state.frame,
+            metrics: state.metrics,
+        };
+        if verdict.difference.is_none() {
+            verdict.difference = check(segment, state.packing)?;
         }
     }
     Ok(())
 }
-
-/// More steps of metrics than any batch holds: what keeps memory bounded in a recording without states.
-const MOST_METRICS: usize = 1 << 20;
 
 /// One run along the whole recording.
 struct Whole<'a> {

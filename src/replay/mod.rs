@@ -19,7 +19,7 @@ pub use balance::{Balance, Worst};
 pub use compare::{Comparison, compare};
 pub use determinism::{Determinism, ReplayError, Way, determinism};
 pub use difference::{Difference, What, ulps};
-pub use recording::Recording;
+pub use recording::{Metrics, Recording, State};
 pub use stream::reading_damaged_bytes;
 
 use crate::frame::{Frame, FrameError};

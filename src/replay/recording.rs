@@ -11,7 +11,7 @@ use crate::relax::fire::FireState;
 use crate::scene::{Scene, Schedule};
 use rerun::log::Chunk;
 use rerun::{Scalars, TimelineName};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -48,6 +48,24 @@ pub struct Recording {
     digests: blake3::Hasher,
     outcome: Option<Outcome>,
     ended: bool,
+    /// Metrics of steps that no state has been handed out for yet.
+    metrics: Metrics,
+}
+
+/// Metrics by step: names and values.
+pub type Metrics = BTreeMap<u64, Vec<(String, f64)>>;
+
+/// A recorded state, with what was recorded on the way to it.
+///
+/// See the example of [`Recording::next_state`].
+#[derive(Clone, Debug)]
+pub struct State {
+    /// The frame.
+    pub frame: Frame,
+    /// The packing at it.
+    pub packing: Packing,
+    /// The metrics of the steps behind the state before, up to and with this one.
+    pub metrics: Metrics,
 }
 
 impl Recording {
@@ -111,7 +129,53 @@ impl Recording {
             digests: blake3::Hasher::new(),
             outcome: None,
             ended: false,
+            metrics: Metrics::new(),
         })
+    }
+
+    /// The next recorded state; `None` at the end.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] at damage.
+    ///
+    /// ```
+    /// use softjam::replay::Recording;
+    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # let path = std::env::temp_dir().join("softjam-next-state-example.rrd");
+    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+    /// # let mut run = Relaxation::new(&scene).unwrap();
+    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
+    /// # record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
+    ///
+    /// let mut recording = Recording::open(&path).unwrap();
+    /// while let Some(state) = recording.next_state().unwrap() {
+    ///     assert_eq!(state.packing.positions(), state.frame.positions);
+    /// }
+    /// # std::fs::remove_file(&path).unwrap();
+    /// ```
+    pub fn next_state(&mut self) -> Result<Option<State>, ReadError> {
+        // More steps than any batch holds: what keeps memory bounded in a recording of metrics alone.
+        const MOST: usize = 1 << 16;
+        while let Some(event) = self.next() {
+            match event? {
+                Event::State(frame) => {
+                    let later = self.metrics.split_off(&(frame.step + 1));
+                    return Ok(Some(State {
+                        packing: self.packing(&frame)?,
+                        metrics: core::mem::replace(&mut self.metrics, later),
+                        frame,
+                    }));
+                }
+                Event::Metric { name, step, value } => {
+                    if self.header.scene.channels.state.is_on() || self.metrics.len() < MOST {
+                        self.metrics.entry(step).or_default().push((name, value));
+                    }
+                }
+                Event::Drawn { .. } | Event::Result { .. } => {}
+            }
+        }
+        Ok(None)
     }
 
     /// The scene that was run.

@@ -55,7 +55,7 @@ fn open(bytes: &[u8]) -> Result<Recording, ReadError> {
 }
 
 fn replay(bytes: &[u8], way: Way) -> Result<Determinism, ReplayError> {
-    determinism(&mut open(bytes)?, way, |_, _| {})
+    determinism(&mut open(bytes)?, way, |_| {})
 }
 
 fn states(bytes: &[u8]) -> Vec<Frame> {
@@ -156,11 +156,17 @@ fn forces_that_do_not_balance_are_told_from_positions_alone() {
     for (bytes, good) in [(record(&scene, |_| {}), true), (forged, false)] {
         let mut recording = open(&bytes).expect("a recording");
         let mut balance = Balance::new(&scene);
-        while let Some(event) = recording.next() {
-            if let Event::State(frame) = event.expect("undamaged") {
-                balance.check(&recording.packing(&frame).expect("its packing"), &frame);
-            }
+        while let Some(state) = recording.next_state().expect("undamaged") {
+            let metrics = state
+                .metrics
+                .get(&state.frame.step)
+                .expect("metrics of every step");
+            balance.check(&state.packing, &state.frame, metrics);
         }
+        assert!(
+            balance.energy_and_pressure.value > 0.0,
+            "the recorded metrics were looked at"
+        );
         assert_eq!(balance.agrees(), good);
         assert!(balance.bears_out(&recording.outcome().expect("a result")));
         if !good {
@@ -453,8 +459,13 @@ fn golden_recordings_verify() {
         for way in WAYS {
             let mut recording = Recording::open(&path).expect(name);
             let mut balance = Balance::new(recording.scene());
-            let verdict = determinism(&mut recording, way, |packing, frame| {
-                balance.check(packing, frame);
+            let verdict = determinism(&mut recording, way, |state| {
+                let metrics = state.metrics.get(&state.frame.step);
+                balance.check(
+                    &state.packing,
+                    &state.frame,
+                    metrics.map_or(&[], Vec::as_slice),
+                );
             });
             let verdict = verdict.expect(name);
             assert_eq!(verdict.difference, None, "{name}");
