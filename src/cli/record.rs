@@ -78,7 +78,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let disks = start.elapsed();
     let writer = Writer::create(&arguments.output, arguments.force, Header::of(&scene, &run))?;
     phase.recording();
-    let bar = Bar::new(&scene);
+    let from = run.step();
+    let bar = Progress::new(&scene, from);
     let start = Instant::now();
     let recorded = record::record(&mut run, writer, &scene.channels, |run| {
         bar.show(run, start);
@@ -91,6 +92,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         &scene,
         &run,
         &summary,
+        from,
         (disks, start.elapsed()),
     ))?;
     Ok(match summary.outcome {
@@ -256,13 +258,15 @@ fn fits_in_memory(scene: &Scene) -> Result<(), SceneError> {
 }
 
 /// The progress bar; none unless standard error is a terminal.
-struct Bar {
+struct Progress {
     bar: Option<ProgressBar>,
     threshold: f64,
+    /// The step that the run begins with.
+    from: u64,
 }
 
-impl Bar {
-    fn new(scene: &Scene) -> Self {
+impl Progress {
+    fn new(scene: &Scene, from: u64) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(1000);
             let style = ProgressStyle::with_template("{bar:24} {msg}");
@@ -272,6 +276,7 @@ impl Bar {
         Self {
             bar,
             threshold: scene.threshold,
+            from,
         }
     }
 
@@ -290,7 +295,7 @@ impl Bar {
             run.step(),
             run.f_max(),
             run.contacts().pairs.len(),
-            run.step() as f64 / seconds
+            (run.step() - self.from) as f64 / seconds
         ));
     }
 
@@ -307,6 +312,7 @@ fn report(
     scene: &Scene,
     run: &Relaxation,
     summary: &Summary,
+    from: u64,
     (disks_took, took): (Duration, Duration),
 ) -> String {
     let o: Observables = run.observables();
@@ -369,7 +375,7 @@ fn report(
             run.law().residual()
         ),
     );
-    let rate = run.step() as f64 / took.as_secs_f64().max(1e-9);
+    let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);
     line(
         "time",
         format!(
