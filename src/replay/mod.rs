@@ -13,6 +13,7 @@ mod determinism;
 mod difference;
 mod header;
 mod recording;
+mod steps;
 mod stream;
 
 pub use balance::{Balance, Worst};

@@ -1,6 +1,7 @@
 //! A recording, read event by event.
 
 use super::header::Header;
+use super::steps::Steps;
 use super::stream::{Ending, Message, Stream, guarded};
 use super::{Event, ReadError};
 use crate::domain::{Domain, Vec2};
@@ -8,7 +9,7 @@ use crate::frame::Frame;
 use crate::packing::{Packing, coverage};
 use crate::record::Outcome;
 use crate::relax::fire::FireState;
-use crate::scene::{Scene, Schedule};
+use crate::scene::Scene;
 use rerun::log::Chunk;
 use rerun::{Scalars, TimelineName};
 use std::collections::{BTreeMap, VecDeque};
@@ -471,41 +472,6 @@ impl Iterator for Recording {
                 self.events.push_back(Err(error));
             }
         }
-    }
-}
-
-/// The order of the recorded states: what the schedule asks for, and one last frame that need not be on it.
-struct Steps {
-    schedule: Schedule,
-    first: u64,
-    last: Option<u64>,
-    off_schedule: bool,
-}
-
-impl Steps {
-    /// Whether `step` may come next.
-    fn accept(&mut self, step: u64) -> Result<(), String> {
-        let Some(last) = self.last else {
-            return if step == self.first {
-                Ok(())
-            } else {
-                Err(format!(
-                    "the first state is that of step {step}, not {}",
-                    self.first
-                ))
-            };
-        };
-        if self.off_schedule || step <= last {
-            return Err(format!("step {step} follows step {last}"));
-        }
-        let expected = self.schedule.after(last);
-        if expected.is_some_and(|expected| step > expected) {
-            return Err(format!(
-                "the states between step {last} and step {step} are missing"
-            ));
-        }
-        self.off_schedule = expected != Some(step);
-        Ok(())
     }
 }
 
