@@ -5,7 +5,7 @@
 //! step, by a Verlet list from a cell list.
 
 use crate::domain::Vec2;
-use crate::force::{backbone, largest_force};
+use crate::force::{backbone, largest_force, mean_coordination};
 use crate::neighbors::NeighborList;
 use crate::packing::{Packing, unit_and_length};
 use crate::relax::fire::{Fire, FireState};
@@ -72,29 +72,22 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let mut neighbors = NeighborList::new();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
     let mut net = vec![Vec2::zeros(); packing.len()];
-    let least = packing.radii().iter().fold(f64::INFINITY, |m, r| r.min(m));
-    let stiffest = 4.0 * PI * line_tension / (6.0 * least);
+    let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
     let mut pairs = Vec::new();
     let mut step = 0;
     loop {
         disk_forces(packing, &mut neighbors, line_tension, &mut net, &mut pairs);
-        let f_max = largest_force(&net);
-        let f_max = f_max / line_tension;
+        let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &pairs);
-            let held = packing.len() - rattlers;
             return DiskReport {
                 steps: step,
                 f_max,
                 converged,
-                coordination: if held == 0 {
-                    0.0
-                } else {
-                    2.0 * contacts as f64 / held as f64
-                },
+                coordination: mean_coordination(contacts, packing.len() - rattlers),
                 rattlers,
             };
         }

@@ -202,12 +202,16 @@ impl Observables {
     /// ```
     #[must_use]
     pub fn coordination(&self) -> f64 {
-        let held = self.particles - self.rattlers;
-        if held == 0 {
-            0.0
-        } else {
-            2.0 * self.backbone_contacts as f64 / held as f64
-        }
+        mean_coordination(self.backbone_contacts, self.particles - self.rattlers)
+    }
+}
+
+/// `Z = 2 N_c / N` of `held` particles with `contacts` among them; 0 where there is none.
+pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
+    if held == 0 {
+        0.0
+    } else {
+        2.0 * contacts as f64 / held as f64
     }
 }
 

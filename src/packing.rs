@@ -168,6 +168,11 @@ impl Packing {
         self.radii.iter().copied().fold(0.0, f64::max)
     }
 
+    /// The smallest undeformed radius.
+    pub(crate) fn smallest_radius(&self) -> f64 {
+        self.radii.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// The centres `r_i`, wrapped into the box.
     ///
     /// ```

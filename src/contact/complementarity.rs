@@ -145,13 +145,6 @@ impl ContactLaw {
 
     /// Two images of one neighbour are at least half a side apart: no particle may reach farther than a quarter.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
-        if let Some((particle, bulge)) = self.absurd {
-            return Err(ContactError::Absurd {
-                particle,
-                bulge,
-                radius: packing.radii()[particle],
-            });
-        }
         let shortest = packing.domain().shortest();
         for (particle, (bulge, radius)) in self.bulges.iter().zip(packing.radii()).enumerate() {
             let reach = radius + bulge;
@@ -162,6 +155,13 @@ impl ContactLaw {
                     shortest,
                 });
             }
+        }
+        if let Some((particle, bulge)) = self.absurd {
+            return Err(ContactError::Absurd {
+                particle,
+                bulge,
+                radius: packing.radii()[particle],
+            });
         }
         Ok(())
     }

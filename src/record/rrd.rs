@@ -81,7 +81,7 @@ pub struct RrdRecorder<W> {
     digests: blake3::Hasher,
 }
 
-/// Rows that wait to be written: the entity's place in [`Pending::rows`] and its data.
+/// Rows that wait to be written, by entity.
 #[derive(Default)]
 struct Pending {
     metrics: Vec<MetricRow>,

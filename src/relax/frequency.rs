@@ -37,7 +37,7 @@ pub fn largest_frequency(
     law: &mut ContactLaw,
     iterations: usize,
 ) -> Result<f64, ContactError> {
-    let least = least_radius(packing);
+    let least = packing.smallest_radius();
     // A contact alone has k = 4πγ/3(R_i + R_j); six of them around a particle give it K = 3k.
     let floor = 3.0 * 4.0 * PI * law.line_tension() / (3.0 * 2.0 * least);
     let contacts = law.contacts();
@@ -87,12 +87,4 @@ pub fn largest_frequency(
         core::mem::swap(&mut u, &mut image);
     }
     Ok(largest.max(floor).sqrt())
-}
-
-fn least_radius(packing: &Packing) -> f64 {
-    packing
-        .radii()
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min)
 }

@@ -167,6 +167,16 @@ impl Relaxation {
         };
         let state = FireState::start(&scene.fire, dt_max);
         let velocities = vec![Vec2::zeros(); packing.len()];
+        Ok(Self::at(scene, packing, law, (0, velocities, state)))
+    }
+
+    /// A run of `scene` at a step with its velocities and minimiser; `law` has its contacts and forces.
+    fn at(
+        scene: &Scene,
+        packing: Packing,
+        law: ContactLaw,
+        (step, velocities, state): (u64, Vec<Vec2>, FireState),
+    ) -> Self {
         let mut run = Self {
             net: vec![Vec2::zeros(); packing.len()],
             packing,
@@ -174,7 +184,7 @@ impl Relaxation {
             law,
             fire: scene.fire,
             state,
-            step: 0,
+            step,
             threshold: scene.threshold,
             step_limit: scene.steps,
             f_max: 0.0,
@@ -183,7 +193,7 @@ impl Relaxation {
             failed: false,
         };
         run.balance();
-        Ok(run)
+        run
     }
 
     /// Goes on from a frame of an earlier run of `scene`, exactly as that run did.
@@ -207,23 +217,8 @@ impl Relaxation {
         *packing.positions_mut() = frame.positions;
         let mut law = scene.contact_law();
         law.restore(&packing, &frame.contacts, &frame.forces);
-        let mut run = Self {
-            net: vec![Vec2::zeros(); packing.len()],
-            packing,
-            velocities: frame.velocities,
-            law,
-            fire: scene.fire,
-            state: frame.minimizer,
-            step: frame.step,
-            threshold: scene.threshold,
-            step_limit: scene.steps,
-            f_max: 0.0,
-            disks: None,
-            yielded: false,
-            failed: false,
-        };
-        run.balance();
-        Ok(run)
+        let moving = (frame.step, frame.velocities, frame.minimizer);
+        Ok(Self::at(scene, packing, law, moving))
     }
 
     /// One move and the contact problem after it.

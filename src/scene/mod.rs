@@ -27,7 +27,7 @@ pub use schedule::{Channels, Schedule};
 use crate::contact::solver::Method;
 use crate::contact::{ContactLaw, Rule};
 use crate::disks::DiskParameters;
-use crate::droplet::contour::{ContourStyle, Placement};
+use crate::droplet::contour::ContourStyle;
 use crate::relax::fire::Fire;
 
 /// One kind of particle in a mixture.
@@ -190,10 +190,7 @@ impl Default for Scene {
             contact_tolerance: 1e-12,
             fire: Fire::default(),
             disks: DiskParameters::default(),
-            contours: ContourStyle {
-                vertices: 32,
-                placement: Placement::Contacts,
-            },
+            contours: ContourStyle::default(),
             channels: Channels::default(),
         }
     }
