@@ -49,7 +49,7 @@ impl Worst {
 /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
 /// let mut balance = Balance::new(&scene);
-/// balance.check(run.packing(), &run.frame(), &[("energy".to_owned(), run.observables().energy)]);
+/// balance.check(run.packing(), &run.frame(), &[("energy", run.observables().energy)]);
 /// assert!(balance.agrees());
 /// ```
 #[derive(Clone, Debug)]
@@ -114,7 +114,7 @@ impl Balance {
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
     ///
     /// See the example of [`Balance`].
-    pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(String, f64)]) {
+    pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
         self.frames += 1;
         let recorded = FrameContacts::of(packing, frame);
@@ -209,7 +209,7 @@ impl Balance {
     }
 
     /// Recorded energy and pressure against those of the contacts found anew.
-    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(String, f64)], step: u64) {
+    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(&'static str, f64)], step: u64) {
         let (domain, gamma) = (packing.domain(), self.law.line_tension());
         let anew = Observables::of(
             &self.law.contacts(),
@@ -219,7 +219,7 @@ impl Balance {
             (0.0, 0.0),
         );
         for (name, recorded) in metrics {
-            let value = match name.as_str() {
+            let value = match *name {
                 "energy" => anew.energy,
                 "pressure" => anew.pressure(),
                 _ => continue,

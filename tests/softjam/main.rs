@@ -16,8 +16,8 @@ mod common;
 mod physics;
 #[cfg(feature = "cli")]
 mod program;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 mod recording;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 mod replay;
 mod scenes;
