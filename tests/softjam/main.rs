@@ -13,6 +13,10 @@
 )]
 
 mod common;
+#[cfg(feature = "recording")]
+mod files;
+#[cfg(feature = "recording")]
+mod mcap;
 mod physics;
 #[cfg(feature = "cli")]
 mod program;
