@@ -1,5 +1,6 @@
 //! The program at its process boundary: exit codes, files, messages.
 
+mod convert;
 mod replay;
 
 use crate::common::Folder;

@@ -407,16 +407,17 @@ fn a_changed_radius_is_found() {
 fn golden_recordings_verify() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
     let cases = [
-        ("jammed", true, true),
-        ("near-jamming", true, true),
-        ("hexagonal", true, true),
-        ("state-only", true, true),
-        ("step-limit", true, false),
-        ("killed", false, false),
+        ("jammed.rrd", true, true),
+        ("jammed.mcap", true, true),
+        ("near-jamming.rrd", true, true),
+        ("hexagonal.rrd", true, true),
+        ("state-only.rrd", true, true),
+        ("step-limit.rrd", true, false),
+        ("killed.rrd", false, false),
     ];
     let mut size = 0;
     for (name, closed, converged) in cases {
-        let path = folder.join(name).with_extension("rrd");
+        let path = folder.join(name);
         size += std::fs::metadata(&path).expect(name).len();
         for way in WAYS {
             let mut recording = Recording::open(&path).expect(name);

@@ -26,6 +26,8 @@ pub(super) const MAGIC: &[u8] = mcap::MAGIC;
 pub(super) struct McapSource {
     stream: Stream,
     topics: Topics,
+    /// How the run ended. Other writers may put it in front of the states, so it is kept for the end.
+    result: Option<Item>,
 }
 
 /// The topics by their numbers.
@@ -76,6 +78,7 @@ impl McapSource {
         let mut about: Option<About> = None;
         let mut toml: Option<String> = None;
         let mut packing: Option<(Vec<f64>, Domain)> = None;
+        let mut result = None;
         loop {
             if let (Some(about), Some(toml), Some((radii, domain))) = (&about, &toml, &packing) {
                 let header = Header {
@@ -85,7 +88,12 @@ impl McapSource {
                     program: about.program.clone(),
                     from_step: about.from_step,
                 };
-                return Ok((Self { stream, topics }, header));
+                let source = Self {
+                    stream,
+                    topics,
+                    result,
+                };
+                return Ok((source, header));
             }
             match stream.next().map_err(not_mcap)? {
                 Some(Record::Metadata(data)) if data.name == ABOUT => {
@@ -95,6 +103,9 @@ impl McapSource {
                 Some(Record::Attachment { header, data, .. }) if header.name == SCENE => {
                     let text = String::from_utf8(data.into_owned());
                     toml = Some(text.map_err(|e| not_mcap(format!("its scene: {e}")))?);
+                }
+                Some(Record::Metadata(data)) if data.name == RESULT => {
+                    result = Some(read_result(&data.metadata).map_err(not_mcap)?);
                 }
                 Some(Record::Channel(channel)) => topics.add(channel).map_err(not_mcap)?,
                 Some(Record::Message { header, data })
@@ -149,6 +160,7 @@ fn checked_scene(path: &str, about: &About, toml: &str) -> Result<Scene, ReadErr
 impl Source for McapSource {
     fn read_on(&mut self, items: &mut Vec<Item>) -> Result<bool, Problem> {
         let Some(record) = self.stream.next()? else {
+            items.extend(self.result.take());
             return Ok(false);
         };
         match record {
@@ -172,8 +184,10 @@ impl Source for McapSource {
                 }
             }
             Record::Metadata(data) if data.name == RESULT => {
-                let result = read_result(&data.metadata);
-                items.push(result.ok_or_else(|| "its result is not whole".to_owned())?);
+                let result = read_result(&data.metadata)?;
+                if self.result.replace(result).is_some() {
+                    return Err("it has two results".to_owned().into());
+                }
             }
             Record::Metadata(data) if data.name == ABOUT => return Err(Problem::Several),
             _ => {}
@@ -226,13 +240,16 @@ fn read_metrics(bytes: &[u8], items: &mut Vec<Item>) -> Result<(), String> {
     Ok(())
 }
 
-fn read_result(metadata: &BTreeMap<String, String>) -> Option<Item> {
-    let text = |key: &str| metadata.get(key).map(String::as_str);
-    let outcome = Outcome {
-        converged: text("converged")?.parse().ok()?,
-        steps: text("steps")?.parse().ok()?,
-        f_max: text("f_max")?.parse().ok()?,
+fn read_result(metadata: &BTreeMap<String, String>) -> Result<Item, String> {
+    let read = || {
+        let text = |key: &str| metadata.get(key).map(String::as_str);
+        let outcome = Outcome {
+            converged: text("converged")?.parse().ok()?,
+            steps: text("steps")?.parse().ok()?,
+            f_max: text("f_max")?.parse().ok()?,
+        };
+        let digest = blake3::Hash::from_hex(text("digest")?).ok()?;
+        Some(Item::Result(outcome, *digest.as_bytes()))
     };
-    let digest = blake3::Hash::from_hex(text("digest")?).ok()?;
-    Some(Item::Result(outcome, *digest.as_bytes()))
+    read().ok_or_else(|| "its result is not whole".to_owned())
 }
