@@ -256,6 +256,30 @@ pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
 /// ```
 #[must_use]
 pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
+    let (numbers, contacts) = held_contacts(particles, pairs);
+    (numbers.iter().filter(|n| **n < 3).count(), contacts)
+}
+
+/// Which particles are held by their contacts, that is, which are no rattlers; see [`backbone`].
+///
+/// # Panics
+///
+/// If a pair names a particle that is not there.
+///
+/// ```
+/// use softjam::force::held;
+///
+/// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
+/// assert_eq!(held(5, &pairs), [true, true, true, true, false]);
+/// ```
+#[must_use]
+pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
+    let (numbers, _) = held_contacts(particles, pairs);
+    numbers.iter().map(|n| *n >= 3).collect()
+}
+
+/// The number of contacts of each particle with others that are held, and the number of contacts between such.
+fn held_contacts(particles: usize, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
     let mut contacts = vec![0u32; particles];
     for p in pairs.iter().flatten() {
         contacts[*p as usize] += 1;
@@ -273,8 +297,7 @@ pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
             held
         });
         if left.len() == before {
-            let rattlers = contacts.iter().filter(|n| **n < 3).count();
-            return (rattlers, left.len());
+            return (contacts, left.len());
         }
     }
 }

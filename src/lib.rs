@@ -59,6 +59,10 @@
     feature = "recording",
     doc = "| [`record`] | recordings, `.rrd` and `.mcap` |\n| [`replay`] | reading them back, checking them |\n| [`convert`] | from one format to the other, with more channels or fewer |"
 )]
+#![cfg_attr(
+    feature = "figure",
+    doc = "| [`figure`] | figures of packings and relaxations |"
+)]
 //!
 //! # Reproducibility
 //!
@@ -71,6 +75,8 @@ pub mod convert;
 pub mod disks;
 pub mod domain;
 pub mod droplet;
+#[cfg(feature = "figure")]
+pub mod figure;
 pub mod force;
 pub mod frame;
 pub mod neighbors;

@@ -191,7 +191,7 @@ fn channel(channels: &mut Channels, k: usize) -> &mut Schedule {
 }
 
 /// A unit variant by its name in the scene file.
-fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+pub fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(text);
     T::deserialize(value).map_err(|e| e.to_string())
 }

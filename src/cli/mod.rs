@@ -3,6 +3,7 @@
 //! Results go to standard output, diagnostics and the progress bar to standard error.
 
 mod convert;
+mod figure;
 mod flags;
 mod info;
 mod output;
@@ -12,6 +13,7 @@ mod scene;
 
 use clap::{Parser, Subcommand};
 use softjam::convert::ConvertError;
+use softjam::figure::FigureError;
 use softjam::record::RecordError;
 use softjam::relax::RelaxError;
 use softjam::scene::SceneError;
@@ -43,6 +45,8 @@ enum Verb {
     Info(info::Arguments),
     /// Convert a recording: .rrd ⇄ .mcap, with more channels or fewer.
     Convert(convert::Arguments),
+    /// Draw a packing, or the fall of f_max, as SVG or PNG.
+    Figure(figure::Arguments),
     /// Print a scene file: the default one, or a file and flags with every field filled in.
     Scene(scene::Arguments),
 }
@@ -69,6 +73,7 @@ pub fn run() -> ExitCode {
         Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Convert(arguments) => convert::run(&arguments),
+        Verb::Figure(arguments) => figure::run(&arguments),
         Verb::Scene(arguments) => scene::run(&arguments),
     };
     match result {
@@ -105,6 +110,11 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         return scene(e);
     }
     if let Some(ConvertError::NoState { .. }) = error.downcast_ref::<ConvertError>() {
+        return 2;
+    }
+    if let Some(FigureError::Name { .. } | FigureError::Nothing(_)) =
+        error.downcast_ref::<FigureError>()
+    {
         return 2;
     }
     match (

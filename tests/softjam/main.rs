@@ -13,6 +13,8 @@
 )]
 
 mod common;
+#[cfg(feature = "figure")]
+mod figures;
 #[cfg(feature = "recording")]
 mod files;
 #[cfg(feature = "recording")]
