@@ -21,6 +21,7 @@
 //! added behind it.
 
 pub mod complementarity;
+mod geometry;
 mod law;
 pub mod list;
 pub mod matrix;

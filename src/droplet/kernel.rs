@@ -128,7 +128,7 @@ impl Direction {
         Self {
             cos: unit.x,
             sin: unit.y,
-            angle: libm::atan2(unit.y, unit.x),
+            angle: super::angle::angle_of(unit),
         }
     }
 
@@ -155,7 +155,7 @@ impl Direction {
 
     /// `g` of the angle between two directions; the same bits whichever of the two is named first.
     ///
-    /// The angle is a difference of two `atan2`, its sine and cosine come from the vectors: no `acos`, which would
+    /// The angle is a difference of two angles to the x axis, its sine and cosine come from the vectors: no `acos`, which would
     /// lose half of the digits near 0 and π.
     ///
     /// ```
@@ -169,9 +169,9 @@ impl Direction {
     pub fn g_between(self, other: Self) -> f64 {
         let difference = self.angle - other.angle; // in [−2π, 2π]
         let cross = self.sin * other.cos - self.cos * other.sin; // sine of the difference
-        let sin = if difference < 0.0 { -cross } else { cross };
         let cos = self.cos * other.cos + self.sin * other.sin;
-        g_of(difference.abs(), sin, cos)
+        // (π − θ) sin θ with θ = |difference|; the two signs cancel without a branch.
+        (PI.copysign(difference) - difference) * cross - 0.5 * cos - 1.0
     }
 }
 
