@@ -75,14 +75,14 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
-    let mut pairs = Vec::new();
     let mut step = 0;
     loop {
-        disk_forces(packing, &mut neighbors, line_tension, &mut net, &mut pairs);
+        neighbors.update(packing, 0.0, SKIN * packing.largest_radius());
+        disk_forces(packing, neighbors.pairs(), line_tension, &mut net);
         let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
-            let (rattlers, contacts) = backbone(packing.len(), &pairs);
+            let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
             return DiskReport {
                 steps: step,
                 f_max,
@@ -106,28 +106,38 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
 /// stability of the densest contact network; half of it keeps clear, the whole multiplies the steps by five.
 const DT_MAX: f64 = 0.41;
 
-/// Net forces of the disks into `net`, the overlapping pairs into `touching`.
-fn disk_forces(
-    packing: &Packing,
-    neighbors: &mut NeighborList,
-    line_tension: f64,
-    net: &mut [Vec2],
-    touching: &mut Vec<[u32; 2]>,
-) {
-    neighbors.update(packing, 0.0, 0.3 * packing.largest_radius());
+/// How far the neighbour list reaches beyond the disks, in units of the largest radius.
+const SKIN: f64 = 0.3;
+
+/// Net forces of the disks into `net`. A pair that does not touch gives zero, without a branch: which of the candidates
+/// touch is nothing that a processor could guess.
+fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
     net.fill(Vec2::zeros());
-    touching.clear();
-    for &pair in neighbors.pairs() {
-        let (i, j) = (pair[0] as usize, pair[1] as usize);
-        let separation = packing.separation(i, j);
-        let sum = packing.radii()[i] + packing.radii()[j];
-        if separation.norm_squared() < sum * sum {
-            let (normal, distance) = unit_and_length(separation);
-            let stiffness = 4.0 * PI * line_tension / (3.0 * sum);
-            let force = normal * (stiffness * (sum - distance));
-            net[i] += force;
-            net[j] -= force;
-            touching.push(pair);
-        }
+    let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
+    let (domain, positions, radii) = (packing.domain(), packing.positions(), packing.radii());
+    for &[i, j] in candidates {
+        let (i, j) = (i as usize, j as usize);
+        let separation = domain.minimum_image(positions[i] - positions[j]);
+        let sum = radii[i] + radii[j];
+        let distance = separation.norm_squared().sqrt();
+        let force = if distance > 0.0 {
+            // n f = (r/|r|) k δ
+            let overlap = (sum - distance).max(0.0);
+            separation * (stiffness_sum * overlap / (sum * distance))
+        } else {
+            unit_and_length(separation).0 * stiffness_sum
+        };
+        net[i] += force;
+        net[j] -= force;
     }
+}
+
+/// The pairs of disks that overlap.
+fn touching(packing: &Packing, neighbors: &NeighborList) -> Vec<[u32; 2]> {
+    let overlap = |pair: &&[u32; 2]| {
+        let [i, j] = pair.map(|p| p as usize);
+        let sum = packing.radii()[i] + packing.radii()[j];
+        packing.separation(i, j).norm_squared() < sum * sum
+    };
+    neighbors.pairs().iter().filter(overlap).copied().collect()
 }

@@ -235,7 +235,7 @@ pub(crate) fn coverage(radii: &[f64], domain: Domain) -> f64 {
 pub(crate) fn unit_and_length(separation: Vec2) -> (Vec2, f64) {
     let r = (separation.x * separation.x + separation.y * separation.y).sqrt();
     if r > 0.0 {
-        (separation / r, r)
+        (separation * (1.0 / r), r)
     } else {
         (Vec2::new(1.0, 0.0), 0.0)
     }

@@ -2,7 +2,7 @@
 
 use super::list::{ContactList, DuplicateContactList};
 use crate::domain::Vec2;
-use crate::droplet::kernel::Direction;
+use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
 use core::f64::consts::PI;
 
@@ -69,7 +69,7 @@ impl Geometry {
     pub(crate) fn refresh(&mut self, packing: &Packing, contacts: &ContactList) {
         assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
         let (positions, radii) = (packing.positions(), packing.radii());
-        let domain = packing.domain();
+        let (domain, angles) = (packing.domain(), Angles::new());
         let mut rows = self
             .normals
             .iter_mut()
@@ -84,7 +84,7 @@ impl Geometry {
                 (*normal, *distance) =
                     unit_and_length(domain.minimum_image(position - positions[j]));
                 *overlap = radius + radii[j] - *distance;
-                let from_lower = Direction::of(-*normal);
+                let from_lower = Direction::with(angles, -*normal);
                 self.toward[slots[0] as usize] = from_lower;
                 self.toward[slots[1] as usize] = from_lower.opposite();
             }

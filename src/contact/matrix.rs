@@ -346,13 +346,16 @@ fn product<const Z: usize, const T: usize>(
 ) {
     let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
     for (c, v) in contacts.iter().zip(values) {
-        let x = c.map(|c| x[c as usize]);
+        let mut at = [0.0; Z];
+        for (at, c) in at.iter_mut().zip(c) {
+            *at = x[*c as usize];
+        }
         let mut sum = [0.0; Z];
         for b in 1..Z {
             for a in 0..b {
                 let entry = v[b * (b - 1) / 2 + a];
-                sum[a] += entry * x[b];
-                sum[b] += entry * x[a];
+                sum[a] += entry * at[b];
+                sum[b] += entry * at[a];
             }
         }
         for (c, sum) in c.iter().zip(sum) {

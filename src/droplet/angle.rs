@@ -16,28 +16,45 @@ use core::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
 /// `cos φ_k` and `φ_k` of `sin φ_k = k/64`, up to beyond 45°.
-static TABLE: LazyLock<[[f64; 2]; 47]> = LazyLock::new(|| {
+static TABLE: LazyLock<[[f64; 2]; 64]> = LazyLock::new(|| {
     core::array::from_fn(|k| {
         let sin = k as f64 / 64.0;
         [(1.0 - sin * sin).sqrt(), libm::asin(sin)]
     })
 });
 
-/// The angle of a *unit* vector to the x axis, in `[−π, π]` (radians); its error is below 4e-16.
-#[inline]
-pub(crate) fn angle_of(unit: Vec2) -> f64 {
-    let (x, y) = (unit.x.abs(), unit.y.abs());
-    let steep = y > x;
-    let (a, b) = if steep { (x, y) } else { (y, x) };
-    // A conversion saturates, and sends NaN to 0.
-    let k = ((64.0 * a + 0.5) as usize).min(46);
-    let [cos, angle] = TABLE[k];
-    let sine = a * cos - b * (k as f64 * (1.0 / 64.0));
-    let s = sine * sine;
-    let phi = angle + (sine + sine * s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (5.0 / 112.0))));
-    let phi = if steep { FRAC_PI_2 - phi } else { phi };
-    let phi = if unit.x < 0.0 { PI - phi } else { phi };
-    phi.copysign(unit.y)
+/// The angle in the upper half plane is `turn + sign φ`: by whether `cos < 0` and whether `|sin| > |cos|`.
+const OCTANTS: [[f64; 2]; 4] = [
+    [0.0, 1.0],
+    [FRAC_PI_2, -1.0],
+    [PI, -1.0],
+    [FRAC_PI_2, 1.0],
+];
+
+/// What angles are computed with; to be had once for many of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Angles(&'static [[f64; 2]; 64]);
+
+impl Angles {
+    pub(crate) fn new() -> Self {
+        Self(&TABLE)
+    }
+
+    /// The angle of a *unit* vector to the x axis, in `[−π, π]` (radians); its error is below 9e-16.
+    #[inline]
+    pub(crate) fn of(self, unit: Vec2) -> f64 {
+        let (x, y) = (unit.x.abs(), unit.y.abs());
+        let (a, b) = (x.min(y), x.max(y));
+        // A conversion saturates, and sends NaN to 0.
+        let k = (64.0 * a + 0.5) as i32 & 63;
+        let [cos, angle] = self.0[k as usize];
+        let sine = a * cos - b * (f64::from(k) * (1.0 / 64.0));
+        let s = sine * sine;
+        let phi = angle + (sine + sine * s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (5.0 / 112.0))));
+        let octant = 2 * usize::from(unit.x < 0.0) + usize::from(y > x);
+        let [turn, sign] = OCTANTS[octant];
+        (turn + sign * phi).copysign(unit.y)
+    }
 }
 
 #[cfg(test)]
@@ -46,11 +63,12 @@ mod tests {
 
     #[test]
     fn angles_are_those_of_atan2() {
+        let angles = Angles::new();
         let mut worst: f64 = 0.0;
         for k in 0..400_000 {
             let angle = (f64::from(k) / 200_000.0 - 1.0) * PI;
             let (sin, cos) = libm::sincos(angle);
-            worst = worst.max((angle_of(Vec2::new(cos, sin)) - libm::atan2(sin, cos)).abs());
+            worst = worst.max((angles.of(Vec2::new(cos, sin)) - libm::atan2(sin, cos)).abs());
         }
         assert!(worst < 9e-16, "{worst:e}");
         for (x, y, angle) in [
@@ -59,8 +77,9 @@ mod tests {
             (-1.0, 0.0, PI),
             (0.0, -1.0, -FRAC_PI_2),
         ] {
-            assert_eq!(angle_of(Vec2::new(x, y)), angle);
+            assert_eq!(angles.of(Vec2::new(x, y)), angle);
         }
-        assert!(angle_of(Vec2::new(f64::NAN, 1.0)).is_nan());
+        let nan = Vec2::new(f64::NAN, f64::NAN);
+        assert!(angles.of(nan).is_nan());
     }
 }

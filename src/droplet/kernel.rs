@@ -17,6 +17,7 @@
 //! with the Fourier series `g(θ) = −Σ_{m ≥ 2} 2/(m² − 1) cos mθ`. The derivation is in D. C. Morse and T. A. Witten,
 //! EPL 22, 549 (1993), and F. F. Dunne et al., Phil. Mag. 99, 2303 (2019); the tests below check it independently.
 
+pub(crate) use super::angle::Angles;
 use core::f64::consts::PI;
 
 /// `g(0)`: the dent under the contact itself.
@@ -125,10 +126,16 @@ impl Direction {
     #[must_use]
     #[inline]
     pub fn of(unit: crate::domain::Vec2) -> Self {
+        Self::with(Angles::new(), unit)
+    }
+
+    /// [`of`](Self::of), for many of them.
+    #[inline]
+    pub(crate) fn with(angles: Angles, unit: crate::domain::Vec2) -> Self {
         Self {
             cos: unit.x,
             sin: unit.y,
-            angle: super::angle::angle_of(unit),
+            angle: angles.of(unit),
         }
     }
 
