@@ -71,15 +71,15 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let fire = Fire::default();
     let mut neighbors = NeighborList::new();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
-    let mut net = vec![Vec2::zeros(); packing.len()];
+    let mut forces = DiskForces::new(packing.len(), line_tension);
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
     let mut step = 0;
     loop {
         neighbors.update(packing, 0.0, SKIN * packing.largest_radius());
-        disk_forces(packing, neighbors.pairs(), line_tension, &mut net);
-        let f_max = largest_force(&net) / line_tension;
+        forces.compute(packing, neighbors.pairs());
+        let f_max = largest_force(&forces.net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
@@ -93,7 +93,7 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
         }
         fire.advance(
             &mut state,
-            &net,
+            &forces.net,
             &mut velocities,
             packing.positions_mut(),
             domain,
@@ -109,27 +109,75 @@ const DT_MAX: f64 = 0.41;
 /// How far the neighbour list reaches beyond the disks, in units of the largest radius.
 const SKIN: f64 = 0.3;
 
-/// Net forces of the disks into `net`. A pair that does not touch gives zero, without a branch: which of the candidates
-/// touch is nothing that a processor could guess.
-fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
-    net.fill(Vec2::zeros());
-    let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
-    let (domain, positions, radii) = (packing.domain(), packing.positions(), packing.radii());
-    for &[i, j] in candidates {
+/// The net forces of the disks, and what they are computed with.
+struct DiskForces {
+    net: Vec<Vec2>,
+    /// The share of the pairs whose lower particle is in the second half.
+    second: Vec<Vec2>,
+    stiffness_sum: f64,
+}
+
+impl DiskForces {
+    fn new(particles: usize, line_tension: f64) -> Self {
+        Self {
+            net: vec![Vec2::zeros(); particles],
+            second: vec![Vec2::zeros(); particles],
+            stiffness_sum: 4.0 * PI * line_tension / 3.0, // k_ij (R_i + R_j)
+        }
+    }
+
+    /// Net forces into `net`, from candidates that ascend.
+    ///
+    /// Two sums are run side by side, of the pairs whose lower particle is in the first and in the second half, since
+    /// pairs of one particle have to wait for each other. Where the halves part does not depend on the candidates, so the
+    /// order of each sum does not either.
+    fn compute(&mut self, packing: &Packing, candidates: &[[u32; 2]]) {
+        self.net.fill(Vec2::zeros());
+        self.second.fill(Vec2::zeros());
+        let half = (packing.len() / 2) as u32;
+        let (first, second) =
+            candidates.split_at(candidates.partition_point(|pair| pair[0] < half));
+        let both = first.len().min(second.len());
+        for (a, b) in first.iter().zip(second) {
+            let (f, g) = (self.force(packing, *a), self.force(packing, *b));
+            add(&mut self.net, *a, f);
+            add(&mut self.second, *b, g);
+        }
+        for a in &first[both..] {
+            let f = self.force(packing, *a);
+            add(&mut self.net, *a, f);
+        }
+        for b in &second[both..] {
+            let g = self.force(packing, *b);
+            add(&mut self.second, *b, g);
+        }
+        for (net, second) in self.net.iter_mut().zip(&self.second) {
+            *net += second;
+        }
+    }
+
+    /// The force on the lower particle. A pair that does not touch gives zero, without a branch: which of the candidates
+    /// touch is nothing that a processor could guess.
+    #[inline]
+    fn force(&self, packing: &Packing, [i, j]: [u32; 2]) -> Vec2 {
         let (i, j) = (i as usize, j as usize);
-        let separation = domain.minimum_image(positions[i] - positions[j]);
-        let sum = radii[i] + radii[j];
+        let separation = packing.separation(i, j);
+        let sum = packing.radii()[i] + packing.radii()[j];
         let distance = separation.norm_squared().sqrt();
-        let force = if distance > 0.0 {
+        if distance > 0.0 {
             // n f = (r/|r|) k δ
             let overlap = (sum - distance).max(0.0);
-            separation * (stiffness_sum * overlap / (sum * distance))
+            separation * (self.stiffness_sum * overlap / (sum * distance))
         } else {
-            unit_and_length(separation).0 * stiffness_sum
-        };
-        net[i] += force;
-        net[j] -= force;
+            unit_and_length(separation).0 * self.stiffness_sum
+        }
     }
+}
+
+#[inline]
+fn add(net: &mut [Vec2], [i, j]: [u32; 2], force: Vec2) {
+    net[i as usize] += force;
+    net[j as usize] -= force;
 }
 
 /// The pairs of disks that overlap.

@@ -98,8 +98,7 @@ impl NeighborList {
         let Some(reference) = &self.reference else {
             return false;
         };
-        let same = reference.domain() == domain && reference.radii() == packing.radii();
-        if !same || margin > self.reach {
+        if !reference.same_particles(packing) || margin > self.reach {
             return false;
         }
         let spare = 0.5 * (self.reach - margin);

@@ -2,6 +2,7 @@
 
 use crate::domain::{Domain, Vec2};
 use core::f64::consts::PI;
+use std::sync::Arc;
 
 /// `N` particles of fixed undeformed radii in a periodic box.
 ///
@@ -26,7 +27,8 @@ use core::f64::consts::PI;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packing {
     domain: Domain,
-    radii: Vec<f64>,
+    /// Shared by the copies of a packing, since they never change.
+    radii: Arc<[f64]>,
     positions: Vec<Vec2>,
 }
 
@@ -114,7 +116,7 @@ impl Packing {
         }
         Ok(Self {
             domain,
-            radii,
+            radii: radii.into(),
             positions,
         })
     }
@@ -188,6 +190,12 @@ impl Packing {
     /// The centres, to be moved; whoever moves them keeps them wrapped and finite.
     pub(crate) fn positions_mut(&mut self) -> &mut Vec<Vec2> {
         &mut self.positions
+    }
+
+    /// Whether the box and the radii are those of `other`; for copies of one packing without a look at the radii.
+    pub(crate) fn same_particles(&self, other: &Self) -> bool {
+        self.domain == other.domain
+            && (Arc::ptr_eq(&self.radii, &other.radii) || self.radii == other.radii)
     }
 
     /// The vector from particle `j` to the nearest image of particle `i`.
