@@ -243,7 +243,8 @@ impl ContactLaw {
             }
         }
         if drops > 0 && self.offending.len() > drops {
-            self.offending.sort_unstable_by_key(|offence| offence.pair());
+            self.offending
+                .sort_unstable_by_key(|offence| offence.pair());
         }
         worst
     }

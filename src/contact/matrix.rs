@@ -252,10 +252,7 @@ impl ContactMatrix {
             let others = contacts.iter().enumerate().filter(move |(k, _)| *k != own);
             others.map(move |(k, &column)| {
                 let (a, b) = (own.min(k), own.max(k));
-                (
-                    column as usize,
-                    self.value[values + b * (b - 1) / 2 + a],
-                )
+                (column as usize, self.value[values + b * (b - 1) / 2 + a])
             })
         })
     }

@@ -27,7 +27,8 @@ pub mod list;
 pub mod matrix;
 pub mod solver;
 
-pub use law::{ContactError, ContactLaw, Rule, Work};
+pub(crate) use law::ACCEPTED;
+pub use law::{ContactError, ContactLaw, Rule, Work, due_tolerance};
 
 use crate::domain::Vec2;
 use crate::frame::Frame;

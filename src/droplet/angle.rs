@@ -24,12 +24,7 @@ static TABLE: LazyLock<[[f64; 2]; 64]> = LazyLock::new(|| {
 });
 
 /// The angle in the upper half plane is `turn + sign φ`: by whether `cos < 0` and whether `|sin| > |cos|`.
-const OCTANTS: [[f64; 2]; 4] = [
-    [0.0, 1.0],
-    [FRAC_PI_2, -1.0],
-    [PI, -1.0],
-    [FRAC_PI_2, 1.0],
-];
+const OCTANTS: [[f64; 2]; 4] = [[0.0, 1.0], [FRAC_PI_2, -1.0], [PI, -1.0], [FRAC_PI_2, 1.0]];
 
 /// What angles are computed with; to be had once for many of them.
 #[derive(Clone, Copy)]

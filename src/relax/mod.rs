@@ -22,7 +22,7 @@
 pub mod fire;
 pub mod frequency;
 
-use crate::contact::{ContactError, ContactLaw, Contacts};
+use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
 use crate::force::{Observables, largest_force, net_forces};
@@ -275,11 +275,12 @@ impl Relaxation {
         let mut due = self.due(self.f_max);
         self.law.solve_within(&self.packing, due)?;
         self.balance();
-        while self.law.residual() > self.promised_residual() {
-            due = if due > 1e-13 {
-                self.due(0.5 * due.min(self.f_max))
+        // The full tolerance, due at 0, keeps every promise.
+        while due > 0.0 && self.law.residual() > self.promised_residual() {
+            due = if self.f_max < due {
+                self.due(0.5 * self.f_max)
             } else {
-                return Ok(());
+                0.0
             };
             self.law.tighten(&self.packing, due)?;
             self.balance();
@@ -293,7 +294,7 @@ impl Relaxation {
     }
 
     /// The residual of the contact law that this frame keeps to, relative to the largest `|δ|` of its contacts: sixteen
-    /// times the [tolerance](ContactLaw::tolerance_at) at its `f_max`, at the full tolerance if `f_max` is not above the
+    /// times the [tolerance](crate::contact::due_tolerance) at its `f_max`, at the full tolerance if `f_max` is not above the
     /// threshold.
     ///
     /// ```
@@ -304,7 +305,7 @@ impl Relaxation {
     #[must_use]
     pub fn promised_residual(&self) -> f64 {
         let due = self.due(self.f_max);
-        16.0 * self.law.tolerance_at(&self.packing, due)
+        ACCEPTED * self.law.tolerance_at(&self.packing, due)
     }
 
     fn balance(&mut self) {

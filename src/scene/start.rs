@@ -50,7 +50,11 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
             // A stable sort: the same numbers everywhere, whatever lies in one square.
             particles.sort_by_key(|(place, ..)| *place);
             let radii = particles.iter().map(|(_, _, radius)| *radius).collect();
-            make(domain, radii, particles.iter().map(|(_, p, _)| *p).collect())?
+            make(
+                domain,
+                radii,
+                particles.iter().map(|(_, p, _)| *p).collect(),
+            )?
         }
         Start::Hexagonal => {
             let mut random = Random::new(scene.seed);
