@@ -4,10 +4,10 @@
 //! on its own, so that both stages share their units. FIRE relaxes them from zero velocity. Work and memory are O(N) a
 //! step, by a Verlet list from a cell list.
 
-use crate::domain::Vec2;
+use crate::domain::{Vec2, nearest};
 use crate::force::{backbone, largest_force, mean_coordination};
 use crate::neighbors::NeighborList;
-use crate::packing::{Packing, unit_and_length};
+use crate::packing::Packing;
 use crate::relax::fire::{Fire, FireState};
 use core::f64::consts::PI;
 
@@ -71,15 +71,15 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let fire = Fire::default();
     let mut neighbors = NeighborList::new();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
-    let mut forces = DiskForces::new(packing.len(), line_tension);
+    let mut net = vec![Vec2::zeros(); packing.len()];
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
     let mut step = 0;
     loop {
         neighbors.update(packing, 0.0, SKIN * packing.largest_radius());
-        forces.compute(packing, neighbors.pairs());
-        let f_max = largest_force(&forces.net) / line_tension;
+        disk_forces(packing, neighbors.pairs(), line_tension, &mut net);
+        let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
@@ -93,7 +93,7 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
         }
         fire.advance(
             &mut state,
-            &forces.net,
+            &net,
             &mut velocities,
             packing.positions_mut(),
             domain,
@@ -109,75 +109,58 @@ const DT_MAX: f64 = 0.41;
 /// How far the neighbour list reaches beyond the disks, in units of the largest radius.
 const SKIN: f64 = 0.3;
 
-/// The net forces of the disks, and what they are computed with.
-struct DiskForces {
-    net: Vec<Vec2>,
-    /// The share of the pairs whose lower particle is in the second half.
-    second: Vec<Vec2>,
-    stiffness_sum: f64,
-}
+/// Pairs that are computed together: their numbers stay in the fastest memory.
+const LANES: usize = 128;
 
-impl DiskForces {
-    fn new(particles: usize, line_tension: f64) -> Self {
-        Self {
-            net: vec![Vec2::zeros(); particles],
-            second: vec![Vec2::zeros(); particles],
-            stiffness_sum: 4.0 * PI * line_tension / 3.0, // k_ij (R_i + R_j)
+/// Net forces of the disks into `net`, from candidates that ascend.
+///
+/// In three passes over a bunch of pairs: separations from scattered positions, forces by columns and without a branch
+/// (which of the candidates touch is nothing that a processor could guess; those that do not give zero), and their sums in
+/// the order of the candidates.
+fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
+    net.fill(Vec2::zeros());
+    let (positions, radii) = (packing.positions(), packing.radii());
+    let sides = packing.domain().lengths();
+    let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
+    let (mut x, mut y, mut sum) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
+    let mut distance = [0.0; LANES];
+    for pairs in candidates.chunks(LANES) {
+        let columns = x.iter_mut().zip(&mut y).zip(&mut sum);
+        for (&[i, j], ((x, y), sum)) in pairs.iter().zip(columns) {
+            let difference = positions[i as usize] - positions[j as usize];
+            (*x, *y) = (difference.x, difference.y);
+            *sum = radii[i as usize] + radii[j as usize];
         }
-    }
-
-    /// Net forces into `net`, from candidates that ascend.
-    ///
-    /// Two sums are run side by side, of the pairs whose lower particle is in the first and in the second half, since
-    /// pairs of one particle have to wait for each other. Where the halves part does not depend on the candidates, so the
-    /// order of each sum does not either.
-    fn compute(&mut self, packing: &Packing, candidates: &[[u32; 2]]) {
-        self.net.fill(Vec2::zeros());
-        self.second.fill(Vec2::zeros());
-        let half = (packing.len() / 2) as u32;
-        let (first, second) =
-            candidates.split_at(candidates.partition_point(|pair| pair[0] < half));
-        let both = first.len().min(second.len());
-        for (a, b) in first.iter().zip(second) {
-            let (f, g) = (self.force(packing, *a), self.force(packing, *b));
-            add(&mut self.net, *a, f);
-            add(&mut self.second, *b, g);
+        // One simple loop a quantity, so that each is done several pairs at a time.
+        for x in &mut x {
+            *x = nearest(*x, sides.x);
         }
-        for a in &first[both..] {
-            let f = self.force(packing, *a);
-            add(&mut self.net, *a, f);
+        for y in &mut y {
+            *y = nearest(*y, sides.y);
         }
-        for b in &second[both..] {
-            let g = self.force(packing, *b);
-            add(&mut self.second, *b, g);
+        for k in 0..LANES {
+            distance[k] = (x[k] * x[k] + y[k] * y[k]).sqrt();
         }
-        for (net, second) in self.net.iter_mut().zip(&self.second) {
-            *net += second;
-        }
-    }
-
-    /// The force on the lower particle. A pair that does not touch gives zero, without a branch: which of the candidates
-    /// touch is nothing that a processor could guess.
-    #[inline]
-    fn force(&self, packing: &Packing, [i, j]: [u32; 2]) -> Vec2 {
-        let (i, j) = (i as usize, j as usize);
-        let separation = packing.separation(i, j);
-        let sum = packing.radii()[i] + packing.radii()[j];
-        let distance = separation.norm_squared().sqrt();
-        if distance > 0.0 {
+        for k in 0..LANES {
             // n f = (r/|r|) k δ
-            let overlap = (sum - distance).max(0.0);
-            separation * (self.stiffness_sum * overlap / (sum * distance))
-        } else {
-            unit_and_length(separation).0 * self.stiffness_sum
+            let factor = stiffness_sum * (sum[k] - distance[k]) / (sum[k] * distance[k]);
+            let touching = distance[k] < sum[k];
+            let factor = if touching { factor } else { 0.0 };
+            x[k] *= factor;
+            y[k] *= factor;
+        }
+        if distance.contains(&0.0) {
+            // Coincident centres are told apart along x, as in `unit_and_length`.
+            for k in (0..LANES).filter(|k| distance[*k] == 0.0) {
+                (x[k], y[k]) = (stiffness_sum, 0.0);
+            }
+        }
+        for (&[i, j], (x, y)) in pairs.iter().zip(x.iter().zip(&y)) {
+            let force = Vec2::new(*x, *y);
+            net[i as usize] += force;
+            net[j as usize] -= force;
         }
     }
-}
-
-#[inline]
-fn add(net: &mut [Vec2], [i, j]: [u32; 2], force: Vec2) {
-    net[i as usize] += force;
-    net[j as usize] -= force;
 }
 
 /// The pairs of disks that overlap.

@@ -151,8 +151,9 @@ fn wrap_outside(x: f64, length: f64) -> f64 {
     }
 }
 
+/// The nearest image of a difference of two coordinates in `[0, length)`.
 #[inline]
-fn nearest(d: f64, length: f64) -> f64 {
+pub(crate) fn nearest(d: f64, length: f64) -> f64 {
     let half = 0.5 * length;
     // Selections instead of branches.
     let above = if d > half { length } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Where the contacts of a list are: normals, distances, overlaps, and the directions seen from each particle.
 
 use super::list::{ContactList, DuplicateContactList};
-use crate::domain::Vec2;
+use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
 use core::f64::consts::PI;
@@ -29,6 +29,9 @@ pub struct Geometry {
     duplicate: DuplicateContactList,
     /// Parallel to the duplicate list: the direction from the particle to its partner.
     toward: Vec<Direction>,
+    /// Components of the normals, for the loops of [`refresh`](Self::refresh).
+    x: Vec<f64>,
+    y: Vec<f64>,
 }
 
 impl Geometry {
@@ -69,25 +72,49 @@ impl Geometry {
     pub(crate) fn refresh(&mut self, packing: &Packing, contacts: &ContactList) {
         assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
         let (positions, radii) = (packing.positions(), packing.radii());
-        let (domain, angles) = (packing.domain(), Angles::new());
-        let mut rows = self
-            .normals
-            .iter_mut()
-            .zip(&mut self.distances)
-            .zip(&mut self.overlaps)
-            .zip(self.duplicate.slots());
+        let sides = packing.domain().lengths();
+        self.x.clear();
+        self.y.clear();
+        self.overlaps.clear();
         for (i, (position, radius)) in positions.iter().zip(radii).enumerate() {
-            let partners = contacts.partners(i);
-            // The partners first: when they run out, no row is taken.
-            for (&j, (((normal, distance), overlap), slots)) in partners.iter().zip(&mut rows) {
-                let j = j as usize;
-                (*normal, *distance) =
-                    unit_and_length(domain.minimum_image(position - positions[j]));
-                *overlap = radius + radii[j] - *distance;
-                let from_lower = Direction::with(angles, -*normal);
-                self.toward[slots[0] as usize] = from_lower;
-                self.toward[slots[1] as usize] = from_lower.opposite();
+            for &j in contacts.partners(i) {
+                let difference = position - positions[j as usize];
+                self.x.push(difference.x);
+                self.y.push(difference.y);
+                self.overlaps.push(radius + radii[j as usize]);
             }
+        }
+        // One simple loop a quantity, so that each is done several contacts at a time.
+        for x in &mut self.x {
+            *x = nearest(*x, sides.x);
+        }
+        for y in &mut self.y {
+            *y = nearest(*y, sides.y);
+        }
+        for ((r, x), y) in self.distances.iter_mut().zip(&self.x).zip(&self.y) {
+            *r = (x * x + y * y).sqrt();
+        }
+        for ((x, y), r) in self.x.iter_mut().zip(&mut self.y).zip(&self.distances) {
+            let inverse = 1.0 / r;
+            *x *= inverse;
+            *y *= inverse;
+        }
+        for (overlap, r) in self.overlaps.iter_mut().zip(&self.distances) {
+            *overlap -= r;
+        }
+        let angles = Angles::new();
+        let rows = self.normals.iter_mut().zip(&self.distances);
+        let columns = self.x.iter().zip(&self.y).zip(self.duplicate.slots());
+        for ((normal, r), ((x, y), slots)) in rows.zip(columns) {
+            // Coincident centres are told apart along x, as in `unit_and_length`.
+            *normal = if *r > 0.0 {
+                Vec2::new(*x, *y)
+            } else {
+                Vec2::new(1.0, 0.0)
+            };
+            let from_lower = Direction::with(angles, -*normal);
+            self.toward[slots[0] as usize] = from_lower;
+            self.toward[slots[1] as usize] = from_lower.opposite();
         }
     }
 
