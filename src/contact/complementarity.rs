@@ -26,6 +26,9 @@ use core::f64::consts::PI;
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 const WIDEST_BULGE: f64 = 5.0;
 
+/// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
+const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
+
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Offence {
@@ -78,13 +81,16 @@ impl ContactLaw {
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         self.assemble(packing);
-        let tolerance = self.allowed(self.scale());
-        let iterations = self.solver.solve(
-            &self.matrix,
-            self.geometry.overlaps(),
-            &mut self.forces,
-            tolerance,
-        )?;
+        let scale = self.scale();
+        let tolerance = self.allowed(scale);
+        let overlaps = self.geometry.overlaps();
+        let iterations = if tolerance > FAR_ABOVE_ROUND_OFF * scale {
+            self.solver
+                .solve_loosely(&self.matrix, overlaps, &mut self.forces, tolerance)
+        } else {
+            self.solver
+                .solve(&self.matrix, overlaps, &mut self.forces, tolerance)
+        }?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
             Some(largest) => self.off = largest,

@@ -65,6 +65,8 @@ impl Geometry {
         self.normals.resize(contacts.len(), Vec2::zeros());
         self.distances.resize(contacts.len(), 0.0);
         self.overlaps.resize(contacts.len(), 0.0);
+        self.x.resize(contacts.len(), 0.0);
+        self.y.resize(contacts.len(), 0.0);
         self.toward.resize(2 * contacts.len(), NOWHERE);
     }
 
@@ -73,38 +75,46 @@ impl Geometry {
         assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
-        self.x.clear();
-        self.y.clear();
-        self.overlaps.clear();
+        let Self {
+            normals,
+            distances,
+            overlaps,
+            toward,
+            x,
+            y,
+            duplicate,
+        } = self;
+        let (x, y, toward) = (&mut x[..], &mut y[..], &mut toward[..]);
+        let mut rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
         for (i, (position, radius)) in positions.iter().zip(radii).enumerate() {
-            for &j in contacts.partners(i) {
+            // The partners first: when they run out, no row is taken.
+            for (&j, ((x, y), overlap)) in contacts.partners(i).iter().zip(&mut rows) {
                 let difference = position - positions[j as usize];
-                self.x.push(difference.x);
-                self.y.push(difference.y);
-                self.overlaps.push(radius + radii[j as usize]);
+                (*x, *y) = (difference.x, difference.y);
+                *overlap = radius + radii[j as usize];
             }
         }
         // One simple loop a quantity, so that each is done several contacts at a time.
-        for x in &mut self.x {
+        for x in &mut *x {
             *x = nearest(*x, sides.x);
         }
-        for y in &mut self.y {
+        for y in &mut *y {
             *y = nearest(*y, sides.y);
         }
-        for ((r, x), y) in self.distances.iter_mut().zip(&self.x).zip(&self.y) {
+        for ((r, x), y) in distances.iter_mut().zip(&*x).zip(&*y) {
             *r = (x * x + y * y).sqrt();
         }
-        for ((x, y), r) in self.x.iter_mut().zip(&mut self.y).zip(&self.distances) {
+        for ((x, y), r) in x.iter_mut().zip(&mut *y).zip(&*distances) {
             let inverse = 1.0 / r;
             *x *= inverse;
             *y *= inverse;
         }
-        for (overlap, r) in self.overlaps.iter_mut().zip(&self.distances) {
+        for (overlap, r) in overlaps.iter_mut().zip(&*distances) {
             *overlap -= r;
         }
         let angles = Angles::new();
-        let rows = self.normals.iter_mut().zip(&self.distances);
-        let columns = self.x.iter().zip(&self.y).zip(self.duplicate.slots());
+        let rows = normals.iter_mut().zip(&*distances);
+        let columns = x.iter().zip(&*y).zip(duplicate.slots());
         for ((normal, r), ((x, y), slots)) in rows.zip(columns) {
             // Coincident centres are told apart along x, as in `unit_and_length`.
             *normal = if *r > 0.0 {
@@ -113,8 +123,8 @@ impl Geometry {
                 Vec2::new(1.0, 0.0)
             };
             let from_lower = Direction::with(angles, -*normal);
-            self.toward[slots[0] as usize] = from_lower;
-            self.toward[slots[1] as usize] = from_lower.opposite();
+            toward[slots[0] as usize] = from_lower;
+            toward[slots[1] as usize] = from_lower.opposite();
         }
     }
 

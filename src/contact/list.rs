@@ -175,19 +175,20 @@ impl DuplicateContactList {
         self.next.extend_from_slice(&self.first);
         self.partner.resize(2 * contacts.len(), 0);
         self.contact.resize(2 * contacts.len(), 0);
-        self.slots.clear();
+        self.slots.resize(contacts.len(), [0; 2]);
+        let (next, partner, contact) = (&mut *self.next, &mut *self.partner, &mut *self.contact);
+        let mut place = |c: u32, p: u32, q: u32| {
+            let next = &mut next[p as usize];
+            let slot = *next;
+            *next += 1;
+            (partner[slot as usize], contact[slot as usize]) = (q, c);
+            slot
+        };
         // Pairs ascend, so a particle meets first its lower partners and then its higher ones, each ascending.
+        let mut slots = (0..).zip(&mut self.slots);
         for i in 0..particles as u32 {
-            for &j in contacts.partners(i as usize) {
-                let c = self.slots.len() as u32;
-                let slots = [(i, j), (j, i)].map(|(p, q)| {
-                    let slot = self.next[p as usize];
-                    self.next[p as usize] += 1;
-                    self.partner[slot as usize] = q;
-                    self.contact[slot as usize] = c;
-                    slot
-                });
-                self.slots.push(slots);
+            for (&j, (c, slots)) in contacts.partners(i as usize).iter().zip(&mut slots) {
+                *slots = [place(c, i, j), place(c, j, i)];
             }
         }
     }

@@ -275,8 +275,10 @@ impl Relaxation {
         let mut due = self.due(self.f_max);
         self.law.solve_within(&self.packing, due)?;
         self.balance();
-        // The full tolerance, due at 0, keeps every promise.
-        while due > 0.0 && self.law.residual() > self.promised_residual() {
+        // The full tolerance, due at 0, keeps every promise; a frame that might be the last is always solved to it.
+        while due > 0.0
+            && (self.due(self.f_max) == 0.0 || self.law.residual() > self.promised_residual())
+        {
             due = if self.f_max < due {
                 self.due(0.5 * self.f_max)
             } else {

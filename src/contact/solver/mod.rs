@@ -138,6 +138,22 @@ impl LinearSolver {
         }
     }
 
+    /// [`solve`](Self::solve) to a tolerance far above round-off.
+    pub(crate) fn solve_loosely(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        tolerance: f64,
+    ) -> Result<usize, SolverError> {
+        match self {
+            Self::ConjugateGradient(cg) => cg.solve_loosely(matrix, overlaps, forces, tolerance),
+            Self::SparseCholesky(_) | Self::GaussJordan(_) => {
+                self.solve(matrix, overlaps, forces, tolerance)
+            }
+        }
+    }
+
     /// `max |A f − δ|` of the last solution (length), where the solver knows it.
     pub(crate) fn largest_residual(&self) -> Option<f64> {
         match self {
