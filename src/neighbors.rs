@@ -106,8 +106,8 @@ impl NeighborList {
         // In pieces, each without a branch. A NaN is farther than anything.
         let pieces = packing.positions().chunks(64);
         pieces.zip(reference.positions().chunks(64)).all(|(p, q)| {
-            let beyond = |far, pair| far | !(moved(pair) <= spare * spare);
-            !p.iter().zip(q).fold(false, beyond)
+            let within = |near, pair| near & (moved(pair) <= spare * spare);
+            p.iter().zip(q).fold(true, within)
         })
     }
 }
