@@ -18,6 +18,7 @@
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
+use super::geometry::Kept;
 use super::law::{ACCEPTED, ContactError, ContactLaw};
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
@@ -102,20 +103,27 @@ impl ContactLaw {
 
     /// Geometry and matrix of the present set at the present positions; what still stands is not done again.
     pub(super) fn assemble(&mut self, packing: &Packing) {
+        if self.structured && self.refreshed {
+            return;
+        }
         if !self.structured {
             self.list.rebuild(packing.len(), &self.pairs);
-            self.geometry.restructure(&self.list);
+            if self.refreshed {
+                self.geometry.exchange(packing, &self.list, &self.kept);
+            } else {
+                self.geometry.restructure(&self.list);
+            }
             let duplicate = self.geometry.duplicate();
             self.matrix
                 .restructure(packing, &self.list, duplicate, self.line_tension);
             self.work.structures += 1;
         }
-        if !(self.structured && self.refreshed) {
+        if !self.refreshed {
             self.geometry.refresh(packing, &self.list);
-            self.matrix
-                .refresh(packing, &self.geometry, self.line_tension);
             self.work.assemblies += 1;
         }
+        self.matrix
+            .refresh(packing, &self.geometry, self.line_tension);
         (self.structured, self.refreshed) = (true, true);
     }
 
@@ -258,32 +266,62 @@ impl ContactLaw {
     /// Exchanges the first `count` offending pairs between the two sides.
     pub(super) fn exchange(&mut self, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
+        if count == 0 {
+            return;
+        }
+        self.kept.clear();
+        let mut begin = 0;
+        for offence in &self.offending[..count] {
+            let (end, then) = match *offence {
+                Offence::Drop(contact, _) => (contact, None),
+                Offence::Add(pair, _) => (self.pairs.partition_point(|p| *p < pair), Some(pair)),
+            };
+            let range = begin..end;
+            begin = end + usize::from(then.is_none());
+            self.kept.push(Kept { range, then });
+        }
+        let range = begin..self.pairs.len();
+        self.kept.push(Kept { range, then: None });
         let (pairs, forces) = &mut self.next;
         pairs.clear();
         forces.clear();
-        let mut kept = 0;
-        for offence in &self.offending[..count] {
-            let place = match *offence {
-                Offence::Drop(contact, _) => contact,
-                Offence::Add(pair, _) => self.pairs.partition_point(|p| *p < pair),
-            };
-            pairs.extend_from_slice(&self.pairs[kept..place]);
-            forces.extend_from_slice(&self.forces[kept..place]);
-            kept = place;
-            match *offence {
-                Offence::Drop(..) => kept += 1,
-                Offence::Add(pair, guess) => {
-                    pairs.push(pair);
-                    forces.push(guess);
-                }
+        let mut offences = self.offending.iter();
+        for kept in &self.kept {
+            pairs.extend_from_slice(&self.pairs[kept.range.clone()]);
+            forces.extend_from_slice(&self.forces[kept.range.clone()]);
+            if let Some(Offence::Add(pair, guess)) = offences.next()
+                && kept.then.is_some()
+            {
+                pairs.push(*pair);
+                forces.push(*guess);
             }
         }
-        pairs.extend_from_slice(&self.pairs[kept..]);
-        forces.extend_from_slice(&self.forces[kept..]);
         core::mem::swap(&mut self.pairs, pairs);
         core::mem::swap(&mut self.forces, forces);
-        if count > 0 {
-            (self.structured, self.parted) = (false, false);
+        self.structured = false;
+        self.part_again(count);
+    }
+
+    /// The pairs of the neighbour list that are not in the set, after the first `count` offending ones were exchanged.
+    fn part_again(&mut self, count: usize) {
+        const FEW: usize = 16;
+        if count > FEW {
+            self.parted = false;
+        }
+        for offence in &self.offending[..count.min(FEW)] {
+            let pair = offence.pair();
+            match (offence, self.others.binary_search(&pair)) {
+                (Offence::Drop(..), Err(place)) => {
+                    // Only what the neighbour list holds.
+                    if self.neighbors.pairs().binary_search(&pair).is_ok() {
+                        self.others.insert(place, pair);
+                    }
+                }
+                (Offence::Add(..), Ok(place)) => {
+                    self.others.remove(place);
+                }
+                _ => {}
+            }
         }
     }
 }

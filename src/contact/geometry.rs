@@ -5,6 +5,7 @@ use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
 use core::f64::consts::PI;
+use core::ops::Range;
 
 /// Where the contacts of a list are: one entry a contact, in the list's order.
 ///
@@ -32,6 +33,25 @@ pub struct Geometry {
     /// Components of the normals, for the loops of [`refresh`](Self::refresh).
     x: Vec<f64>,
     y: Vec<f64>,
+    /// The directions from the lower particle to the higher.
+    directions: Vec<Direction>,
+    /// Room for [`exchange`](Self::exchange).
+    spare: Spare,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Spare {
+    normals: Vec<Vec2>,
+    directions: Vec<Direction>,
+    distances: Vec<f64>,
+    overlaps: Vec<f64>,
+}
+
+/// A stretch of contacts that stay, and the pair that comes behind it.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept {
+    pub(crate) range: Range<usize>,
+    pub(crate) then: Option<[u32; 2]>,
 }
 
 impl Geometry {
@@ -65,6 +85,7 @@ impl Geometry {
         self.normals.resize(contacts.len(), Vec2::zeros());
         self.distances.resize(contacts.len(), 0.0);
         self.overlaps.resize(contacts.len(), 0.0);
+        self.directions.resize(contacts.len(), NOWHERE);
         self.x.resize(contacts.len(), 0.0);
         self.y.resize(contacts.len(), 0.0);
         self.toward.resize(2 * contacts.len(), NOWHERE);
@@ -79,12 +100,12 @@ impl Geometry {
             normals,
             distances,
             overlaps,
-            toward,
+            directions,
             x,
             y,
-            duplicate,
+            ..
         } = self;
-        let (x, y, toward) = (&mut x[..], &mut y[..], &mut toward[..]);
+        let (x, y) = (&mut x[..], &mut y[..]);
         let mut rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
         for (i, (position, radius)) in positions.iter().zip(radii).enumerate() {
             // The partners first: when they run out, no row is taken.
@@ -113,19 +134,64 @@ impl Geometry {
             *overlap -= r;
         }
         let angles = Angles::new();
-        let rows = normals.iter_mut().zip(&*distances);
-        let columns = x.iter().zip(&*y).zip(duplicate.slots());
-        for ((normal, r), ((x, y), slots)) in rows.zip(columns) {
+        let rows = normals.iter_mut().zip(&*distances).zip(directions);
+        for (((normal, r), direction), (x, y)) in rows.zip(x.iter().zip(&*y)) {
             // Coincident centres are told apart along x, as in `unit_and_length`.
             *normal = if *r > 0.0 {
                 Vec2::new(*x, *y)
             } else {
                 Vec2::new(1.0, 0.0)
             };
-            let from_lower = Direction::with(angles, -*normal);
-            toward[slots[0] as usize] = from_lower;
-            toward[slots[1] as usize] = from_lower.opposite();
+            *direction = Direction::with(angles, -*normal);
         }
+        self.look_around();
+    }
+
+    /// The directions of the contacts, as each of the two particles sees them.
+    fn look_around(&mut self) {
+        let toward = &mut self.toward[..];
+        for (direction, slots) in self.directions.iter().zip(self.duplicate.slots()) {
+            toward[slots[0] as usize] = *direction;
+            toward[slots[1] as usize] = direction.opposite();
+        }
+    }
+
+    /// Takes over other contacts at the same positions. `kept` are stretches of the contacts as they were, each but the
+    /// last followed by a new contact if it says so; only new contacts are computed.
+    pub(crate) fn exchange(&mut self, packing: &Packing, contacts: &ContactList, kept: &[Kept]) {
+        let spare = &mut self.spare;
+        spare.normals.clear();
+        spare.directions.clear();
+        spare.distances.clear();
+        spare.overlaps.clear();
+        for part in kept {
+            let range = part.range.clone();
+            spare
+                .normals
+                .extend_from_slice(&self.normals[range.clone()]);
+            spare
+                .directions
+                .extend_from_slice(&self.directions[range.clone()]);
+            spare
+                .distances
+                .extend_from_slice(&self.distances[range.clone()]);
+            spare.overlaps.extend_from_slice(&self.overlaps[range]);
+            if let Some([i, j]) = part.then {
+                let (i, j) = (i as usize, j as usize);
+                let (normal, distance) = unit_and_length(packing.separation(i, j));
+                spare.normals.push(normal);
+                spare.directions.push(Direction::of(-normal));
+                spare.distances.push(distance);
+                let sum = packing.radii()[i] + packing.radii()[j];
+                spare.overlaps.push(sum - distance);
+            }
+        }
+        core::mem::swap(&mut self.normals, &mut spare.normals);
+        core::mem::swap(&mut self.directions, &mut spare.directions);
+        core::mem::swap(&mut self.distances, &mut spare.distances);
+        core::mem::swap(&mut self.overlaps, &mut spare.overlaps);
+        self.restructure(contacts);
+        self.look_around();
     }
 
     /// The unit vectors `n_ij = (r_i − r_j)/r_ij`; the force on `i` is `+f_ij n_ij`.

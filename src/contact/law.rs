@@ -2,6 +2,7 @@
 
 use super::Contacts;
 use super::complementarity::Offence;
+use super::geometry::Kept;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
 use super::solver::{LinearSolver, Method, SolverError};
@@ -110,6 +111,8 @@ pub struct ContactLaw {
     /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
     pub(super) structured: bool,
     pub(super) refreshed: bool,
+    /// What the last exchange kept.
+    pub(super) kept: Vec<Kept>,
     /// The neighbour list without `pairs`, and whether it is up to date.
     pub(super) others: Vec<[u32; 2]>,
     pub(super) parted: bool,
@@ -140,7 +143,7 @@ pub struct Work {
     pub sweeps: u64,
     /// Iterations of the linear solver.
     pub iterations: u64,
-    /// Geometries computed with the values of the matrix `A`.
+    /// Geometries computed of all contacts; after an exchange only that of new ones is.
     pub assemblies: u64,
     /// Structures of the contact set (lists, places in `A`) built.
     pub structures: u64,
@@ -183,6 +186,7 @@ impl ContactLaw {
             forces: Vec::new(),
             structured: false,
             refreshed: false,
+            kept: Vec::new(),
             others: Vec::new(),
             parted: false,
             slack: 0.0,

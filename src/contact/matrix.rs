@@ -109,15 +109,17 @@ impl ContactMatrix {
     ) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
-        self.diagonal.clear();
-        self.inverse_diagonal.clear();
+        self.diagonal.resize(contacts.len(), 0.0);
+        self.inverse_diagonal.resize(contacts.len(), 0.0);
+        let mut rows = self.diagonal.iter_mut();
         for (i, radius) in radii.iter().enumerate() {
-            for &j in contacts.partners(i) {
+            for (&j, compliance) in contacts.partners(i).iter().zip(&mut rows) {
                 let sum = radius + radii[j as usize];
-                let compliance = -G_AT_CONTACT * per_radius * sum;
-                self.diagonal.push(compliance);
-                self.inverse_diagonal.push(1.0 / compliance);
+                *compliance = -G_AT_CONTACT * per_radius * sum;
             }
+        }
+        for (inverse, compliance) in self.inverse_diagonal.iter_mut().zip(&self.diagonal) {
+            *inverse = 1.0 / compliance;
         }
         self.sort_blocks(duplicate);
         self.ends.clear();
