@@ -2,9 +2,12 @@
 
 use super::Contacts;
 use super::complementarity::Offence;
+use super::error::ContactError;
+use super::geometry::Kept;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
-use super::solver::{LinearSolver, Method, SolverError};
+use super::solver::{LinearSolver, Method};
+use super::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 
@@ -23,53 +26,6 @@ pub enum Rule {
     /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
     /// exceed the solver's tolerance.)
     Seed,
-}
-
-/// Why the contact problem has no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ContactError {
-    /// `A f = δ` was not solved.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// A particle reaches so far that it could touch two images of the same neighbour.
-    #[error(
-        "particle {particle} reaches {reach:.4} (radius and largest bulge), more than a quarter of the box's shorter side \
-         {shortest:.4}: it could touch two images of one neighbour; take more particles or a lower phi"
-    )]
-    BoxTooSmall {
-        /// The particle.
-        particle: usize,
-        /// Its undeformed radius and the bound of its bulge (length).
-        reach: f64,
-        /// The shorter side of the box (length).
-        shortest: f64,
-    },
-    /// The forces are so large that a contour would bulge by several radii.
-    #[error(
-        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces are absurd, \
-         as after a step that was too long or in a start that overlaps far too much"
-    )]
-    Absurd {
-        /// The particle.
-        particle: usize,
-        /// The bound of its bulge (length).
-        bulge: f64,
-        /// Its undeformed radius (length).
-        radius: f64,
-    },
-    /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
-    #[error(
-        "the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps"
-    )]
-    Unsettled {
-        /// Pairs that still break the law.
-        offending: usize,
-        /// Contacts in the set.
-        contacts: usize,
-        /// Sweeps done.
-        sweeps: usize,
-    },
 }
 
 /// The contact law: a solver of the contact problem with its settings, its buffers and its last answer.
@@ -106,12 +62,24 @@ pub struct ContactLaw {
     pub(super) matrix: ContactMatrix,
     pub(super) pairs: Vec<[u32; 2]>,
     pub(super) forces: Vec<f64>,
+    /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
+    pub(super) structured: bool,
+    pub(super) refreshed: bool,
+    /// What the last exchange kept.
+    pub(super) kept: Vec<Kept>,
+    /// The neighbour list without `pairs`, and whether it is up to date.
+    pub(super) others: Vec<[u32; 2]>,
+    pub(super) parted: bool,
+    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
+    pub(super) slack: f64,
     pub(super) image: Vec<f64>,
     pub(super) bulges: Vec<f64>,
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) absurd: Option<(usize, f64)>,
     pub(super) offending: Vec<Offence>,
     pub(super) next: (Vec<[u32; 2]>, Vec<f64>),
+    /// The largest `|A f − δ|` (length).
+    pub(super) off: f64,
     pub(super) residual: f64,
     pub(super) work: Work,
 }
@@ -125,12 +93,22 @@ pub struct ContactLaw {
 pub struct Work {
     /// Contact problems solved.
     pub solves: u64,
-    /// Linear systems set up and solved.
+    /// Linear systems solved.
     pub sweeps: u64,
     /// Iterations of the linear solver.
     pub iterations: u64,
+    /// Geometries computed of all contacts; after an exchange only that of new ones is.
+    pub assemblies: u64,
+    /// Structures of the contact set (lists, places in `A`) built.
+    pub structures: u64,
+    /// Symbolic factorisations; none unless the solver is the sparse Cholesky.
+    pub symbolic: u64,
+    /// Distances computed of pairs outside the set.
+    pub distances: u64,
     /// Gaps evaluated of pairs outside the set.
     pub gaps: u64,
+    /// Neighbour lists built.
+    pub neighbor_lists: u64,
 }
 
 impl Default for ContactLaw {
@@ -160,11 +138,18 @@ impl ContactLaw {
             matrix: ContactMatrix::default(),
             pairs: Vec::new(),
             forces: Vec::new(),
+            structured: false,
+            refreshed: false,
+            kept: Vec::new(),
+            others: Vec::new(),
+            parted: false,
+            slack: 0.0,
             image: Vec::new(),
             bulges: Vec::new(),
             absurd: None,
             offending: Vec::new(),
             next: (Vec::new(), Vec::new()),
+            off: 0.0,
             residual: 0.0,
             work: Work::default(),
         }
@@ -227,12 +212,21 @@ impl ContactLaw {
 
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
+        self.take(pairs, forces);
+        self.refreshed = false;
+        self.assemble(packing);
+        self.measure_equation();
+        self.inspect(packing);
+    }
+
+    fn take(&mut self, pairs: &[[u32; 2]], forces: &[f64]) {
+        if self.pairs != pairs {
+            self.pairs.clear();
+            self.pairs.extend_from_slice(pairs);
+            (self.structured, self.parted) = (false, false);
+        }
         self.forces.clear();
         self.forces.extend_from_slice(forces);
-        self.assemble(packing);
-        self.inspect(packing);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
@@ -257,7 +251,7 @@ impl ContactLaw {
     /// ```
     #[must_use]
     pub fn accepted_residual(&self) -> f64 {
-        16.0 * self.tolerance
+        ACCEPTED * self.tolerance
     }
 
     /// What it has cost so far.
@@ -267,7 +261,11 @@ impl ContactLaw {
     /// ```
     #[must_use]
     pub fn work(&self) -> Work {
-        self.work
+        Work {
+            neighbor_lists: self.neighbors.builds(),
+            symbolic: self.solver.symbolic_factorizations(),
+            ..self.work
+        }
     }
 
     /// Solves the contact problem at the positions of `packing`, starting from contacts and forces of a step before.
@@ -291,10 +289,7 @@ impl ContactLaw {
         forces: &[f64],
     ) -> Result<(), ContactError> {
         assert_eq!(pairs.len(), forces.len(), "one force a contact");
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
-        self.forces.clear();
-        self.forces.extend_from_slice(forces);
+        self.take(pairs, forces);
         self.solve_again(packing)
     }
 
@@ -316,19 +311,113 @@ impl ContactLaw {
     /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
     /// ```
     pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
+        self.solve_within(packing, 0.0)
+    }
+
+    /// [`solve_again`](Self::solve_again) to the tolerance that is due at `f_max` (units of γ).
+    pub(crate) fn solve_within(
+        &mut self,
+        packing: &Packing,
+        f_max: f64,
+    ) -> Result<(), ContactError> {
+        self.refreshed = false;
+        self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {
             Rule::Complementarity => self.settle(packing)?,
             Rule::Seed => {
+                self.slack = 0.0;
                 self.sweep(packing)?;
                 self.exchange(self.offending.len());
                 self.sweep(packing)?;
             }
         }
-        // The forces of an unfinished exchange can be anything; only an answer is held against the box.
-        if self.residual <= self.accepted_residual() {
+        self.check_answer(packing)
+    }
+
+    /// Solves on at the positions solved last, to the tolerance that is due at `f_max` (units of γ).
+    pub(crate) fn tighten(&mut self, packing: &Packing, f_max: f64) -> Result<(), ContactError> {
+        self.slack = slack(packing, f_max);
+        self.settle(packing)?;
+        self.check_answer(packing)
+    }
+
+    /// The forces of an unfinished exchange can be anything; only an answer is held against the box.
+    fn check_answer(&self, packing: &Packing) -> Result<(), ContactError> {
+        let scale = self.scale();
+        if self.residual * scale <= ACCEPTED * self.allowed(scale) {
             self.check_images(packing)?;
         }
         Ok(())
+    }
+
+    /// The tolerance that is due in a frame whose largest net force is `f_max` (units of γ), with the contacts found last;
+    /// see [`due_tolerance`](super::due_tolerance).
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.law().tolerance_at(run.packing(), 0.0), 1e-12);
+    /// assert!(run.law().tolerance_at(run.packing(), 1e-3) > 1e-8);
+    /// ```
+    #[must_use]
+    pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
+        match self.rule {
+            Rule::Complementarity => {
+                relative_tolerance(self.tolerance, slack(packing, f_max), self.scale())
+            }
+            Rule::Seed => self.tolerance,
+        }
+    }
+
+    /// The residual looked for, as a length; `scale` is the largest `|δ|`.
+    pub(super) fn allowed(&self, scale: f64) -> f64 {
+        scale * relative_tolerance(self.tolerance, self.slack, scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{Domain, Vec2};
+
+    /// Where each buffer is, and how long it may get without moving.
+    fn buffers(law: &ContactLaw) -> [(usize, usize); 6] {
+        fn of<T>(v: &Vec<T>) -> (usize, usize) {
+            (v.as_ptr() as usize, v.capacity())
+        }
+        [
+            of(&law.pairs),
+            of(&law.forces),
+            of(&law.others),
+            of(&law.offending),
+            of(&law.bulges),
+            of(&law.kept),
+        ]
+    }
+
+    #[test]
+    fn a_solution_with_the_same_contacts_moves_no_buffer() {
+        let side = 6.0;
+        let mut points = Vec::new();
+        for k in 0..36 {
+            points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
+        }
+        let packing = |shift: f64| {
+            let mut points = points.clone();
+            for (k, p) in points.iter_mut().enumerate() {
+                p.x += shift * (k as f64).sqrt();
+            }
+            Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
+        };
+        let mut law = ContactLaw::default();
+        law.solve(&packing(0.0), &[], &[]).unwrap();
+        law.solve_again(&packing(1e-4)).unwrap();
+        let (before, structures) = (buffers(&law), law.work().structures);
+        for k in 2..50 {
+            law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
+        }
+        assert_eq!(law.work().structures, structures, "the same contacts");
+        assert_eq!(buffers(&law), before);
     }
 }

@@ -21,12 +21,18 @@
 //! added behind it.
 
 pub mod complementarity;
+mod error;
+mod geometry;
 mod law;
 pub mod list;
 pub mod matrix;
 pub mod solver;
+mod tolerance;
 
-pub use law::{ContactError, ContactLaw, Rule, Work};
+pub use error::ContactError;
+pub use law::{ContactLaw, Rule, Work};
+pub(crate) use tolerance::ACCEPTED;
+pub use tolerance::due_tolerance;
 
 use crate::domain::Vec2;
 use crate::frame::Frame;
