@@ -69,7 +69,7 @@ fn disks_report_of_a_run_is_that_of_its_disks() {
 #[test]
 fn largest_force_falls_below_the_threshold_and_later_near_jamming() {
     let steps = |phi: f64| {
-        let runs = (1..=21).map(|seed| {
+        let runs = (1..=15).map(|seed| {
             let mut run = Relaxation::new(&scene(256, phi, seed)).unwrap();
             let first = run.f_max();
             while run.status() == Status::Running {
