@@ -77,3 +77,4 @@ pub mod relax;
 #[cfg(feature = "rrd")]
 pub mod replay;
 pub mod scene;
+mod simplicial;

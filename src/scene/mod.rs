@@ -28,6 +28,7 @@ use crate::contact::solver::Method;
 use crate::contact::{ContactLaw, Rule};
 use crate::disks::DiskParameters;
 use crate::droplet::contour::ContourStyle;
+use crate::force::Form;
 use crate::relax::fire::Fire;
 
 /// One kind of particle in a mixture.
@@ -113,6 +114,9 @@ pub enum Minimizer {
     /// FIRE 2.0, see [`crate::relax::fire`].
     #[default]
     Fire,
+    /// FIRE through the rearrangements, then Newton's method, see [`crate::relax::newton`].
+    #[serde(rename = "fire+newton")]
+    FireNewton,
 }
 
 /// Everything that a run depends on.
@@ -152,6 +156,8 @@ pub struct Scene {
     pub steps: u64,
     /// The minimiser.
     pub minimizer: Minimizer,
+    /// The forces that move the particles. Default central.
+    pub forces: Form,
     /// Upper bound of the minimiser's time step (time, mass 1), positive. Default: from the largest frequency at the
     /// start.
     pub dt_max: Option<f64>,
@@ -184,6 +190,7 @@ impl Default for Scene {
             threshold: 1e-10,
             steps: 200_000,
             minimizer: Minimizer::default(),
+            forces: Form::default(),
             dt_max: None,
             contact_rule: Rule::default(),
             contact_solver: Method::default(),

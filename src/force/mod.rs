@@ -3,6 +3,12 @@
 //! Central form, Saitoh 2.2.3: `F_i = Σ_j f_ij n_ij`. It is not the gradient of the energy below (the two differ by
 //! O(f²)), so nothing here is used to search for a minimum.
 
+mod form;
+pub(crate) mod turning;
+
+pub use form::{Form, NetForces};
+pub(crate) use form::tangent;
+
 use crate::contact::Contacts;
 use crate::domain::{Domain, Vec2};
 

@@ -1,0 +1,233 @@
+//! Newton's method on the balance of forces: how `minimizer = "fire+newton"` finishes.
+//!
+//! FIRE takes a packing through its rearrangements; what is left is smooth, and there Newton's method converges
+//! quadratically. One step solves
+//!
+//! ```text
+//! J Δr = −F,       A Δf = −(dδ and dA of Δr)
+//! ```
+//!
+//! where `J` is the derivative of the net forces with the contact problem solved inside ([`linear`]): the coupled
+//! problem in `(r, f)` with `f` eliminated. The linear system is solved only as far as the step is worth (an inexact
+//! Newton method: R. S. Dembo, S. C. Eisenstat and T. Steihaug, SIAM J. Numer. Anal. 19, 400 (1982)) by [`gmres`],
+//! preconditioned with the Cholesky factor of the stiffness of independent contacts ([`stiffness`]). Then the contact
+//! problem is solved at the new positions, starting from `f + Δf`: the contact set may change.
+//!
+//! **One step is one frame, and nothing is remembered.** No history of steps, no lagged factorisation: a step is a
+//! function of positions, contacts and forces alone, so a run goes on from any frame with the same bits.
+//!
+//! **Nothing is forced.** `F` need not be the gradient of anything, so a step is judged by `|F|`, the root of the sum of
+//! squares of the net forces: it is kept if `|F|` falls to [`KEPT`] of what it was or less, shortened up to [`HALVINGS`]
+//! times otherwise, and then given up. A step that goes against the forces (`F·Δr ≤ 0`) would climb to a saddle and is
+//! given up at once. A step given up leaves the frame as it was; FIRE makes the move instead, and many moves more before
+//! the next attempt.
+
+mod gmres;
+mod linear;
+mod stiffness;
+
+use crate::contact::ContactLaw;
+use crate::domain::Vec2;
+use crate::force::NetForces;
+use crate::packing::Packing;
+use gmres::{Gmres, Report};
+use linear::Linear;
+use stiffness::Stiffness;
+
+/// How FIRE and Newton's method take turns: part of the minimiser's state.
+///
+/// ```
+/// use softjam::relax::newton::Turns;
+/// assert_eq!(Turns::default().moves, 0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turns {
+    /// Steps of Newton's method that were kept.
+    pub moves: u32,
+    /// Attempts given up since the last one that was kept.
+    pub failures: u32,
+    /// Moves that FIRE has still to make before the next attempt.
+    pub wait: u32,
+}
+
+impl Turns {
+    /// An attempt was given up: FIRE's turn, the longer the more often that has happened.
+    pub(super) fn fail(&mut self) {
+        self.wait = PAUSE << self.failures.min(LONGEST_PAUSE);
+        self.failures = self.failures.saturating_add(1);
+    }
+
+    /// An attempt was kept.
+    pub(super) fn succeed(&mut self) {
+        self.moves = self.moves.saturating_add(1);
+        self.failures = 0;
+    }
+}
+
+/// Moves of FIRE after an attempt given up, doubled with each further one, up to 2^`LONGEST_PAUSE` times.
+const PAUSE: u32 = 50;
+const LONGEST_PAUSE: u32 = 4;
+
+/// Newton's method is tried when `f_max` is not above this fraction of the mean contact force.
+const SWITCH: f64 = 1e-3;
+
+/// A step is kept if it brings `|F|` to this fraction of what it was, or less.
+const KEPT: f64 = 0.5;
+
+/// How often a step is halved.
+const HALVINGS: u32 = 3;
+
+/// The longest displacement of a particle in one step, in units of the smallest radius.
+const LONGEST: f64 = 0.1;
+
+/// Newton's method with its buffers; they hold nothing that one step hands to the next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Newton {
+    linear: Linear,
+    stiffness: Stiffness,
+    gmres: Gmres,
+    right: Vec<f64>,
+    step: Vec<f64>,
+    scratch: Vec<f64>,
+    pairs: Vec<[u32; 2]>,
+    forces: Vec<f64>,
+    guess: Vec<f64>,
+    change: Vec<f64>,
+    positions: Vec<Vec2>,
+    net: Vec<Vec2>,
+}
+
+impl Newton {
+    /// Whether `f_max` (units of γ) is low enough for an attempt.
+    pub(super) fn is_due(f_max: f64, law: &ContactLaw) -> bool {
+        let forces = law.contacts().forces;
+        let sum: f64 = forces.iter().sum();
+        f_max * law.line_tension() * forces.len() as f64 <= SWITCH * sum
+    }
+
+    /// Tries one step from the contacts and forces of `law` at the positions of `packing`, whose net forces are `net`.
+    ///
+    /// If the step is kept, `packing` and `law` are at its end and the answer is `true`; otherwise they are as they were.
+    /// `goal` is the `f_max` (units of γ) below which nothing more is asked for.
+    pub(super) fn advance(
+        &mut self,
+        packing: &mut Packing,
+        law: &mut ContactLaw,
+        form: &mut NetForces,
+        net: &[Vec2],
+        (f_max, goal): (f64, f64),
+    ) -> bool {
+        let Some(before) = self.propose(packing, law, form, net, (f_max, goal)) else {
+            return false;
+        };
+        self.pairs.clear();
+        self.pairs.extend_from_slice(law.contacts().pairs);
+        self.forces.clear();
+        self.forces.extend_from_slice(law.contacts().forces);
+        self.positions.clear();
+        self.positions.extend_from_slice(packing.positions());
+        let domain = packing.domain();
+        let longest = self.step.as_chunks::<2>().0.iter();
+        let longest = longest.fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
+        let cap = LONGEST * packing.smallest_radius() / longest.sqrt();
+        let mut part = cap.min(1.0);
+        for _ in 0..=HALVINGS {
+            for ((x, old), s) in packing
+                .positions_mut()
+                .iter_mut()
+                .zip(&self.positions)
+                .zip(self.step.as_chunks::<2>().0)
+            {
+                *x = domain.wrap(old + Vec2::new(s[0], s[1]) * part);
+            }
+            self.guess.clear();
+            self.guess.extend(
+                (self.forces.iter().zip(&self.change)).map(|(f, change)| f + part * change),
+            );
+            if law.solve(packing, &self.pairs, &self.guess).is_ok()
+                && law.residual() <= law.accepted_residual()
+            {
+                self.net.resize(packing.len(), Vec2::zeros());
+                form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
+                if length(&self.net) <= KEPT * before {
+                    return true;
+                }
+            }
+            part *= 0.5;
+        }
+        packing.positions_mut().copy_from_slice(&self.positions);
+        law.restore(packing, &self.pairs, &self.forces);
+        false
+    }
+
+    /// The displacements into `step` and the change of the forces into `change`; returns `|F|`, or `None` where there is
+    /// no step worth trying.
+    fn propose(
+        &mut self,
+        packing: &Packing,
+        law: &ContactLaw,
+        form: &NetForces,
+        net: &[Vec2],
+        (f_max, goal): (f64, f64),
+    ) -> Option<f64> {
+        let contacts = law.contacts();
+        if contacts.pairs.is_empty() || contacts.distances.contains(&0.0) {
+            return None;
+        }
+        let compliances = law.matrix().diagonal();
+        self.stiffness
+            .rebuild(&contacts, compliances, packing.len())
+            .ok()?;
+        let before = length(net);
+        self.right.clear();
+        self.right.extend(net.iter().flat_map(|f| [-f.x, -f.y]));
+        // What is left of |F| behind a full step is O(|F|²): solving the linear problem further than that is in vain, and
+        // so is a result far below the goal.
+        let mean = contacts.forces.iter().sum::<f64>() / contacts.forces.len() as f64;
+        let quadratic = 10.0 * f_max * law.line_tension() / mean;
+        let tolerance = quadratic.max(0.1 * goal / f_max).clamp(1e-10, 1e-2);
+        let n = self.right.len();
+        self.step.resize(n, 0.0);
+        self.scratch.resize(n, 0.0);
+        let mut linear = self.linear.at(form.form(), law, packing);
+        let (stiffness, scratch) = (&self.stiffness, &mut self.scratch);
+        let Report {
+            residual,
+            iterations,
+        } = self.gmres.solve(
+            &self.right,
+            &mut self.step,
+            tolerance,
+            MOST_PRODUCTS,
+            |v, w| {
+                scratch.copy_from_slice(v);
+                stiffness.solve(scratch);
+                linear.product(scratch, w, INNER * tolerance)
+            },
+        )?;
+        stiffness.solve(&mut self.step);
+        let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
+        if std::env::var_os("NEWTON_TRACE").is_some() {
+            eprintln!("gmres residual {residual:e} of {tolerance:e} iterations {iterations} F·dr {downhill:e}");
+        }
+        if residual > KEPT || downhill.is_nan() || downhill <= 0.0 {
+            return None;
+        }
+        if !linear.forces(&self.step, 1e-8) {
+            return None;
+        }
+        self.change.clear();
+        self.change.extend_from_slice(linear.change());
+        Some(before)
+    }
+}
+
+/// Products with `J` in one step.
+const MOST_PRODUCTS: usize = 150;
+
+/// The contact problem inside a product is solved to this fraction of what is asked of the whole.
+const INNER: f64 = 0.1;
+
+fn length(net: &[Vec2]) -> f64 {
+    net.iter().map(Vec2::norm_squared).sum::<f64>().sqrt()
+}
