@@ -27,6 +27,7 @@ mod linear;
 mod stiffness;
 
 use crate::contact::ContactLaw;
+use crate::contact::solver::ConjugateGradient;
 use crate::domain::Vec2;
 use crate::force::NetForces;
 use crate::packing::Packing;
@@ -74,8 +75,11 @@ const SWITCH: f64 = 1e-3;
 /// A step is kept if it brings `|F|` to this fraction of what it was, or less.
 const KEPT: f64 = 0.5;
 
-/// How often a step is halved.
-const HALVINGS: u32 = 3;
+/// How often a step is computed anew on the contact set that the last one ran into.
+const CORRECTIONS: u32 = 3;
+
+/// A step that runs into a contact set which differs in more contacts than this has left the range of the linear problem.
+const MOST_EXCHANGED: usize = 4;
 
 /// The longest displacement of a particle in one step, in units of the smallest radius.
 const LONGEST: f64 = 0.1;
@@ -95,6 +99,8 @@ pub(super) struct Newton {
     change: Vec<f64>,
     positions: Vec<Vec2>,
     net: Vec<Vec2>,
+    piece: Vec<[u32; 2]>,
+    solver: ConjugateGradient,
 }
 
 impl Newton {
@@ -102,7 +108,7 @@ impl Newton {
     pub(super) fn is_due(f_max: f64, law: &ContactLaw) -> bool {
         let forces = law.contacts().forces;
         let sum: f64 = forces.iter().sum();
-        f_max * law.line_tension() * forces.len() as f64 <= SWITCH * sum
+        f_max * law.line_tension() * forces.len() as f64 <= std::env::var("SWITCH").ok().and_then(|s| s.parse().ok()).unwrap_or(SWITCH) * sum
     }
 
     /// Tries one step from the contacts and forces of `law` at the positions of `packing`, whose net forces are `net`.
@@ -117,70 +123,101 @@ impl Newton {
         net: &[Vec2],
         (f_max, goal): (f64, f64),
     ) -> bool {
-        let Some(before) = self.propose(packing, law, form, net, (f_max, goal)) else {
-            return false;
-        };
         self.pairs.clear();
         self.pairs.extend_from_slice(law.contacts().pairs);
         self.forces.clear();
         self.forces.extend_from_slice(law.contacts().forces);
         self.positions.clear();
         self.positions.extend_from_slice(packing.positions());
-        let domain = packing.domain();
-        let longest = self.step.as_chunks::<2>().0.iter();
-        let longest = longest.fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
-        let cap = LONGEST * packing.smallest_radius() / longest.sqrt();
-        let mut part = cap.min(1.0);
-        for _ in 0..=HALVINGS {
-            for ((x, old), s) in packing
-                .positions_mut()
-                .iter_mut()
-                .zip(&self.positions)
-                .zip(self.step.as_chunks::<2>().0)
-            {
-                *x = domain.wrap(old + Vec2::new(s[0], s[1]) * part);
+        self.net.clear();
+        self.net.extend_from_slice(net);
+        let before = length(net);
+        for correction in 0..=CORRECTIONS {
+            if !self.propose(packing, law, form, (f_max, goal)) {
+                break;
             }
+            let longest = self.step.as_chunks::<2>().0.iter();
+            let longest = longest.fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
+            let cap = LONGEST * packing.smallest_radius() / longest.sqrt();
+            let part = cap.min(1.0);
             self.guess.clear();
             self.guess.extend(
-                (self.forces.iter().zip(&self.change)).map(|(f, change)| f + part * change),
+                (law.contacts().forces.iter().zip(&self.change)).map(|(f, df)| f + part * df),
             );
-            if law.solve(packing, &self.pairs, &self.guess).is_ok()
-                && law.residual() <= law.accepted_residual()
-            {
-                self.net.resize(packing.len(), Vec2::zeros());
+            self.piece.clear();
+            self.piece.extend_from_slice(law.contacts().pairs);
+            self.move_by(packing, part);
+            let solved = law.solve(packing, &self.piece, &self.guess).is_ok()
+                && law.residual() <= law.accepted_residual();
+            if solved {
                 form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
-                if length(&self.net) <= KEPT * before {
-                    return true;
-                }
             }
-            part *= 0.5;
+            if std::env::var_os("NEWTON_TRACE").is_some() {
+                let new = law.contacts().pairs;
+                let lost: Vec<_> = self.piece.iter().zip(&self.guess).filter(|(p, _)| new.binary_search(p).is_err()).collect();
+                let won: Vec<_> = new.iter().zip(law.contacts().forces).filter(|(p, _)| self.piece.binary_search(p).is_err()).collect();
+                eprintln!("  {correction} longest {:e} part {part:e}: {before:e} -> {:e} (max {:e}), residual {:e}, lost {lost:?} won {won:?}", longest.sqrt(), length(&self.net), crate::force::largest_force(&self.net), law.residual());
+            }
+            if solved && length(&self.net) <= KEPT * before {
+                return true;
+            }
+            packing.positions_mut().copy_from_slice(&self.positions);
+            if !solved || correction == CORRECTIONS || !(1..=MOST_EXCHANGED).contains(&exchanged(&self.piece, law.contacts().pairs)) {
+                break;
+            }
+            // The step ran into another contact set: once more, from the same positions on the smooth piece of that set.
+            self.piece.clear();
+            self.piece.extend_from_slice(law.contacts().pairs);
+            self.guess.clear();
+            self.guess.extend_from_slice(law.contacts().forces);
+            law.restore(packing, &self.piece, &self.guess);
+            let scale = law.contacts().overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+            if self
+                .solver
+                .solve(law.matrix(), law.contacts().overlaps, &mut self.guess, 1e-14 * scale)
+                .is_err()
+            {
+                break;
+            }
+            law.restore(packing, &self.piece, &self.guess);
+            form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
         }
         packing.positions_mut().copy_from_slice(&self.positions);
         law.restore(packing, &self.pairs, &self.forces);
         false
     }
 
-    /// The displacements into `step` and the change of the forces into `change`; returns `|F|`, or `None` where there is
-    /// no step worth trying.
+    fn move_by(&self, packing: &mut Packing, part: f64) {
+        let domain = packing.domain();
+        let steps = self.step.as_chunks::<2>().0;
+        for ((x, old), s) in (packing.positions_mut().iter_mut().zip(&self.positions)).zip(steps) {
+            *x = domain.wrap(old + Vec2::new(s[0], s[1]) * part);
+        }
+    }
+
+    /// The displacements into `step` and the change of the forces into `change`, from the contacts of `law`, whose net
+    /// forces are in `net`; `false` where there is no step worth trying.
     fn propose(
         &mut self,
         packing: &Packing,
         law: &ContactLaw,
         form: &NetForces,
-        net: &[Vec2],
         (f_max, goal): (f64, f64),
-    ) -> Option<f64> {
+    ) -> bool {
         let contacts = law.contacts();
         if contacts.pairs.is_empty() || contacts.distances.contains(&0.0) {
-            return None;
+            return false;
         }
         let compliances = law.matrix().diagonal();
-        self.stiffness
+        if self
+            .stiffness
             .rebuild(&contacts, compliances, packing.len())
-            .ok()?;
-        let before = length(net);
+            .is_err()
+        {
+            return false;
+        }
         self.right.clear();
-        self.right.extend(net.iter().flat_map(|f| [-f.x, -f.y]));
+        self.right.extend(self.net.iter().flat_map(|f| [-f.x, -f.y]));
         // What is left of |F| behind a full step is O(|F|²): solving the linear problem further than that is in vain, and
         // so is a result far below the goal.
         let mean = contacts.forces.iter().sum::<f64>() / contacts.forces.len() as f64;
@@ -191,10 +228,10 @@ impl Newton {
         self.scratch.resize(n, 0.0);
         let mut linear = self.linear.at(form.form(), law, packing);
         let (stiffness, scratch) = (&self.stiffness, &mut self.scratch);
-        let Report {
+        let Some(Report {
             residual,
             iterations,
-        } = self.gmres.solve(
+        }) = self.gmres.solve(
             &self.right,
             &mut self.step,
             tolerance,
@@ -204,21 +241,23 @@ impl Newton {
                 stiffness.solve(scratch);
                 linear.product(scratch, w, INNER * tolerance)
             },
-        )?;
+        ) else {
+            return false;
+        };
         stiffness.solve(&mut self.step);
         let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
         if std::env::var_os("NEWTON_TRACE").is_some() {
             eprintln!("gmres residual {residual:e} of {tolerance:e} iterations {iterations} F·dr {downhill:e}");
         }
         if residual > KEPT || downhill.is_nan() || downhill <= 0.0 {
-            return None;
+            return false;
         }
         if !linear.forces(&self.step, 1e-8) {
-            return None;
+            return false;
         }
         self.change.clear();
         self.change.extend_from_slice(linear.change());
-        Some(before)
+        true
     }
 }
 
@@ -227,6 +266,15 @@ const MOST_PRODUCTS: usize = 150;
 
 /// The contact problem inside a product is solved to this fraction of what is asked of the whole.
 const INNER: f64 = 0.1;
+
+/// In how many pairs two lists, both ascending, differ.
+fn exchanged(a: &[[u32; 2]], b: &[[u32; 2]]) -> usize {
+    let missing = |a: &[[u32; 2]], b: &[[u32; 2]]| {
+        let lacks = |p: &&[u32; 2]| b.binary_search(p).is_err();
+        a.iter().filter(lacks).count()
+    };
+    missing(a, b) + missing(b, a)
+}
 
 fn length(net: &[Vec2]) -> f64 {
     net.iter().map(Vec2::norm_squared).sum::<f64>().sqrt()
