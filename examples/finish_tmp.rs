@@ -7,8 +7,8 @@ fn main() {
     let form = if a.len() > 4 && a[4] > 0.0 { softjam::force::Form::Gradient } else { Default::default() };
     let verbose = a.len() > 5;
     for seed in 1..=seeds {
-        let scene = Scene { particles: n, phi, seed, threshold: thr, minimizer: Minimizer::FireNewton, forces: form, steps: 60000,
-            contact_tolerance: if thr < 1e-12 { 1e-14 } else { 1e-12 }, ..Scene::default() };
+        let scene = Scene { particles: n, phi, seed, threshold: thr, minimizer: Minimizer::FireNewton, forces: form, steps: 200000,
+            contact_tolerance: std::env::var("TOL").ok().and_then(|s| s.parse().ok()).unwrap_or(1e-12), ..Scene::default() };
         let mut run = Relaxation::new(&scene).unwrap();
         let (mut tf, mut tn, mut fails) = (0.0, 0.0, 0);
         let mut t_fail = 0.0;

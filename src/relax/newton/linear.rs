@@ -130,15 +130,52 @@ impl At<'_> {
             }
         }
         y.fill(0.0);
+        self.add_forces(1.0, y);
+        true
+    }
+
+    /// Takes `−A⁻¹ (A f − δ)`, by which the forces at hand miss the contact problem, into account: subtracts what it does to
+    /// the net forces from `right` and puts it into `miss`. `false` if it cannot be had.
+    pub(super) fn correct(&mut self, right: &mut [f64], miss: &mut Vec<f64>) -> bool {
+        let b = &mut *self.buffers;
+        let forces = self.contacts.forces;
+        b.right.clear();
+        b.right.resize(forces.len(), 0.0);
+        self.matrix.multiply(forces, &mut b.right);
+        let mut largest: f64 = 0.0;
+        for (r, d) in b.right.iter_mut().zip(self.contacts.overlaps) {
+            *r = d - *r;
+            largest = largest.max(r.abs());
+        }
+        miss.clear();
+        miss.resize(forces.len(), 0.0);
+        let solved = b.solver.solve(self.matrix, &b.right, miss, 1e-3 * largest);
+        if solved.is_err() {
+            return false;
+        }
+        b.along.clear();
+        b.along.extend_from_slice(miss);
+        b.across.clear();
+        b.across.resize(forces.len(), 0.0);
+        if self.form == Form::Gradient {
+            b.turning.add_m_transposed(forces, miss, &mut b.across);
+        }
+        self.add_forces(-1.0, right);
+        true
+    }
+
+    /// Adds `sign` times what acts along the normals and across them to the particles.
+    fn add_forces(&self, sign: f64, y: &mut [f64]) {
+        let b = &*self.buffers;
         for (c, &[i, j]) in self.contacts.pairs.iter().enumerate() {
             let (i, j) = (2 * i as usize, 2 * j as usize);
             let n = self.contacts.normals[c];
-            let f = n * b.along[c] + tangent(n) * (b.across[c] / distances[c]);
+            let f = n * b.along[c] + tangent(n) * (b.across[c] / self.contacts.distances[c]);
+            let f = f * sign;
             y[i] += f.x;
             y[i + 1] += f.y;
             y[j] -= f.x;
             y[j + 1] -= f.y;
         }
-        true
     }
 }

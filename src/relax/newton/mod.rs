@@ -70,7 +70,7 @@ const PAUSE: u32 = 50;
 const LONGEST_PAUSE: u32 = 4;
 
 /// Newton's method is tried when `f_max` is not above this fraction of the mean contact force.
-const SWITCH: f64 = 1e-3;
+const SWITCH: f64 = 5e-4;
 
 /// A step is kept if it brings `|F|` to this fraction of what it was, or less.
 const KEPT: f64 = 0.5;
@@ -108,7 +108,7 @@ impl Newton {
     pub(super) fn is_due(f_max: f64, law: &ContactLaw) -> bool {
         let forces = law.contacts().forces;
         let sum: f64 = forces.iter().sum();
-        f_max * law.line_tension() * forces.len() as f64 <= std::env::var("SWITCH").ok().and_then(|s| s.parse().ok()).unwrap_or(SWITCH) * sum
+        f_max * law.line_tension() * forces.len() as f64 <= SWITCH * sum
     }
 
     /// Tries one step from the contacts and forces of `law` at the positions of `packing`, whose net forces are `net`.
@@ -136,63 +136,93 @@ impl Newton {
             if !self.propose(packing, law, form, (f_max, goal)) {
                 break;
             }
-            let longest = self.step.as_chunks::<2>().0.iter();
-            let longest = longest.fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
-            let cap = LONGEST * packing.smallest_radius() / longest.sqrt();
-            let part = cap.min(1.0);
-            self.guess.clear();
-            self.guess.extend(
-                (law.contacts().forces.iter().zip(&self.change)).map(|(f, df)| f + part * df),
-            );
             self.piece.clear();
             self.piece.extend_from_slice(law.contacts().pairs);
-            self.move_by(packing, part);
-            let solved = law.solve(packing, &self.piece, &self.guess).is_ok()
-                && law.residual() <= law.accepted_residual();
-            if solved {
-                form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
+            let part = self.move_packing(packing);
+            self.guess.clear();
+            let forces = law.contacts().forces.iter();
+            self.guess
+                .extend(forces.zip(&self.change).map(|(f, df)| f + part * df));
+            if !self.settle(packing, law) {
+                break;
             }
-            if std::env::var_os("NEWTON_TRACE").is_some() {
-                let new = law.contacts().pairs;
-                let lost: Vec<_> = self.piece.iter().zip(&self.guess).filter(|(p, _)| new.binary_search(p).is_err()).collect();
-                let won: Vec<_> = new.iter().zip(law.contacts().forces).filter(|(p, _)| self.piece.binary_search(p).is_err()).collect();
-                eprintln!("  {correction} longest {:e} part {part:e}: {before:e} -> {:e} (max {:e}), residual {:e}, lost {lost:?} won {won:?}", longest.sqrt(), length(&self.net), crate::force::largest_force(&self.net), law.residual());
-            }
-            if solved && length(&self.net) <= KEPT * before {
+            form.evaluate(
+                &law.contacts(),
+                packing,
+                law.line_tension(),
+                &mut self.net,
+            );
+            if length(&self.net) <= KEPT * before {
                 return true;
             }
             packing.positions_mut().copy_from_slice(&self.positions);
-            if !solved || correction == CORRECTIONS || !(1..=MOST_EXCHANGED).contains(&exchanged(&self.piece, law.contacts().pairs)) {
-                break;
-            }
-            // The step ran into another contact set: once more, from the same positions on the smooth piece of that set.
-            self.piece.clear();
-            self.piece.extend_from_slice(law.contacts().pairs);
-            self.guess.clear();
-            self.guess.extend_from_slice(law.contacts().forces);
-            law.restore(packing, &self.piece, &self.guess);
-            let scale = law.contacts().overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-            if self
-                .solver
-                .solve(law.matrix(), law.contacts().overlaps, &mut self.guess, 1e-14 * scale)
-                .is_err()
+            let exchanged = exchanged(&self.piece, law.contacts().pairs);
+            if correction == CORRECTIONS
+                || !(1..=MOST_EXCHANGED).contains(&exchanged)
+                || !self.change_piece(packing, law)
             {
                 break;
             }
-            law.restore(packing, &self.piece, &self.guess);
-            form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
+            form.evaluate(
+                &law.contacts(),
+                packing,
+                law.line_tension(),
+                &mut self.net,
+            );
         }
         packing.positions_mut().copy_from_slice(&self.positions);
         law.restore(packing, &self.pairs, &self.forces);
         false
     }
 
-    fn move_by(&self, packing: &mut Packing, part: f64) {
-        let domain = packing.domain();
+    /// Moves the particles from `positions` by `step`, shortened if it is too long; returns the part of it that was made.
+    fn move_packing(&self, packing: &mut Packing) -> f64 {
         let steps = self.step.as_chunks::<2>().0;
-        for ((x, old), s) in (packing.positions_mut().iter_mut().zip(&self.positions)).zip(steps) {
+        let squared = steps
+            .iter()
+            .fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
+        let part = (LONGEST * packing.smallest_radius() / squared.sqrt()).min(1.0);
+        let domain = packing.domain();
+        let moved = packing.positions_mut().iter_mut().zip(&self.positions);
+        for ((x, old), s) in moved.zip(steps) {
             *x = domain.wrap(old + Vec2::new(s[0], s[1]) * part);
         }
+        part
+    }
+
+    /// The contact law at the positions of `packing`, from the contacts of `piece` with the forces of `guess`; `false` if
+    /// there is no answer.
+    ///
+    /// Behind a step that was small enough the guess *is* the answer, and the balance that it was made for would only
+    /// suffer from solving again: positions are rounded, and the overlaps with them.
+    fn settle(&self, packing: &Packing, law: &mut ContactLaw) -> bool {
+        if self.guess.iter().all(|f| *f > 0.0) {
+            law.restore(packing, &self.piece, &self.guess);
+            if law.residual() <= law.accepted_residual().min(EXACT) {
+                return true;
+            }
+        }
+        law.solve(packing, &self.piece, &self.guess).is_ok()
+            && law.residual() <= law.accepted_residual()
+    }
+
+    /// The step ran into the contact set that `law` has now: takes this set, at the positions from which the step was made
+    /// and with the forces that solve `A f = δ` there, whatever their signs. `false` if they cannot be had.
+    fn change_piece(&mut self, packing: &Packing, law: &mut ContactLaw) -> bool {
+        self.piece.clear();
+        self.piece.extend_from_slice(law.contacts().pairs);
+        self.guess.clear();
+        self.guess.extend_from_slice(law.contacts().forces);
+        law.restore(packing, &self.piece, &self.guess);
+        let overlaps = law.contacts().overlaps;
+        let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        let solved = self
+            .solver
+            .solve(law.matrix(), overlaps, &mut self.guess, EXACT * scale);
+        if solved.is_ok() {
+            law.restore(packing, &self.piece, &self.guess);
+        }
+        solved.is_ok()
     }
 
     /// The displacements into `step` and the change of the forces into `change`, from the contacts of `law`, whose net
@@ -218,6 +248,10 @@ impl Newton {
         }
         self.right.clear();
         self.right.extend(self.net.iter().flat_map(|f| [-f.x, -f.y]));
+        let mut linear = self.linear.at(form.form(), law, packing);
+        if !linear.correct(&mut self.right, &mut self.change) {
+            return false;
+        }
         // What is left of |F| behind a full step is O(|F|²): solving the linear problem further than that is in vain, and
         // so is a result far below the goal.
         let mean = contacts.forces.iter().sum::<f64>() / contacts.forces.len() as f64;
@@ -226,12 +260,8 @@ impl Newton {
         let n = self.right.len();
         self.step.resize(n, 0.0);
         self.scratch.resize(n, 0.0);
-        let mut linear = self.linear.at(form.form(), law, packing);
         let (stiffness, scratch) = (&self.stiffness, &mut self.scratch);
-        let Some(Report {
-            residual,
-            iterations,
-        }) = self.gmres.solve(
+        let Some(Report { residual, .. }) = self.gmres.solve(
             &self.right,
             &mut self.step,
             tolerance,
@@ -246,23 +276,24 @@ impl Newton {
         };
         stiffness.solve(&mut self.step);
         let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
-        if std::env::var_os("NEWTON_TRACE").is_some() {
-            eprintln!("gmres residual {residual:e} of {tolerance:e} iterations {iterations} F·dr {downhill:e}");
-        }
         if residual > KEPT || downhill.is_nan() || downhill <= 0.0 {
             return false;
         }
         if !linear.forces(&self.step, 1e-8) {
             return false;
         }
-        self.change.clear();
-        self.change.extend_from_slice(linear.change());
+        for (total, df) in self.change.iter_mut().zip(linear.change()) {
+            *total += df;
+        }
         true
     }
 }
 
 /// Products with `J` in one step.
 const MOST_PRODUCTS: usize = 150;
+
+/// The residual of the contact law, relative to the largest overlap, below which forces are taken as they are.
+const EXACT: f64 = 1e-12;
 
 /// The contact problem inside a product is solved to this fraction of what is asked of the whole.
 const INNER: f64 = 0.1;
