@@ -7,8 +7,8 @@ fn main() {
     let form = if a.len() > 4 && a[4] > 0.0 { softjam::force::Form::Gradient } else { Default::default() };
     let verbose = a.len() > 5;
     for seed in 1..=seeds {
-        let scene = Scene { particles: n, phi, seed, threshold: thr, minimizer: Minimizer::FireNewton, forces: form, steps: 200000,
-            contact_tolerance: std::env::var("TOL").ok().and_then(|s| s.parse().ok()).unwrap_or(1e-12), ..Scene::default() };
+        let scene = Scene { particles: n, phi, seed, threshold: thr, minimizer: Minimizer::FireNewton, forces: form, steps: std::env::var("STEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(200000),
+            contact_tolerance: std::env::var("TOL").ok().and_then(|s| s.parse().ok()).unwrap_or(1e-12), dt_max: std::env::var("DT").ok().and_then(|s| s.parse().ok()), ..Scene::default() };
         let mut run = Relaxation::new(&scene).unwrap();
         let (mut tf, mut tn, mut fails) = (0.0, 0.0, 0);
         let mut t_fail = 0.0;
@@ -23,6 +23,6 @@ fn main() {
             else { tf += dt; if after.failures > before.failures { fails += 1; t_fail += dt; if verbose { println!("  failed {:6} {:.2e} {:.1} ms", run.step(), fm, dt*1e3); } } }
         }
         let t = run.frame().minimizer.turns;
-        println!("N {n} phi {phi} seed {seed}: {:?} f_max {:.1e} res {:.1e} steps {} fire {:.0} ms, newton {} steps {:.0} ms, failed {fails} {:.0} ms", run.status(), run.f_max(), run.law().residual(), run.step(), tf*1e3, t.moves, tn*1e3, t_fail*1e3);
+        println!("dt_max {:.3} N {n} phi {phi} seed {seed}: {:?} f_max {:.1e} res {:.1e} steps {} fire {:.0} ms, newton {} steps {:.0} ms, failed {fails} {:.0} ms", run.frame().minimizer.dt_max, run.status(), run.f_max(), run.law().residual(), run.step(), tf*1e3, t.moves, tn*1e3, t_fail*1e3);
     }
 }

@@ -179,3 +179,128 @@ impl At<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::NetForces;
+    use crate::relax::Relaxation;
+    use crate::relax::frequency::largest_frequency;
+    use crate::scene::Scene;
+
+    /// A packing that is not in balance, with its contacts.
+    fn packing(phi: f64) -> (Packing, ContactLaw) {
+        let scene = Scene {
+            particles: 48,
+            phi,
+            contact_tolerance: 1e-14,
+            ..Scene::default()
+        };
+        let packing = Relaxation::new(&scene).unwrap().packing().clone();
+        let mut law = scene.contact_law();
+        law.solve(&packing, &[], &[]).unwrap();
+        (packing, law)
+    }
+
+    fn net(law: &ContactLaw, packing: &Packing, form: Form) -> Vec<f64> {
+        let mut net = vec![Vec2::zeros(); packing.len()];
+        NetForces::new(form).evaluate(&law.contacts(), packing, 1.0, &mut net);
+        net.iter().flat_map(|f| [f.x, f.y]).collect()
+    }
+
+    /// Displacements of length 1 at most, with a part of every mode.
+    fn displacements(particles: usize, salt: f64) -> Vec<f64> {
+        (0..2 * particles)
+            .map(|k| libm::sin(salt * (k + 1) as f64))
+            .collect()
+    }
+
+    #[test]
+    fn products_are_the_derivative_of_the_net_forces() {
+        for form in [Form::Central, Form::Gradient] {
+            for phi in [0.88, 1.0] {
+                let (packing, law) = packing(phi);
+                let x = displacements(packing.len(), 0.7);
+                let mut product = vec![0.0; x.len()];
+                assert!(Linear::default().at(form, &law, &packing).product(
+                    &x,
+                    &mut product,
+                    1e-13
+                ));
+                let moved = |h: f64| {
+                    let mut moved = packing.clone();
+                    let shifts = x.as_chunks::<2>().0;
+                    for (p, s) in moved.positions_mut().iter_mut().zip(shifts) {
+                        *p = packing.domain().wrap(*p + Vec2::new(s[0], s[1]) * h);
+                    }
+                    let mut there = law.clone();
+                    there.solve_again(&moved).unwrap();
+                    assert_eq!(there.contacts().pairs, law.contacts().pairs, "h = {h}");
+                    net(&there, &moved, form)
+                };
+                // Five points: the error is O(h⁴).
+                let h = 1e-5;
+                let samples = [moved(-2.0 * h), moved(-h), moved(h), moved(2.0 * h)];
+                let largest = product.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+                for (k, y) in product.iter().enumerate() {
+                    let centred = (samples[0][k] - samples[3][k]
+                        + 8.0 * (samples[2][k] - samples[1][k]))
+                        / (12.0 * h);
+                    assert!(
+                        (centred - y).abs() < 1e-7 * largest,
+                        "{form:?}, φ = {phi}, component {k}: {y} against {centred}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn linear_problem_is_symmetric_with_the_gradient_form_only() {
+        let (packing, law) = packing(0.95);
+        let (x, y) = (displacements(48, 0.7), displacements(48, 1.3));
+        let asymmetry = |form| {
+            let mut linear = Linear::default();
+            let mut at = linear.at(form, &law, &packing);
+            let (mut jx, mut jy) = (vec![0.0; 96], vec![0.0; 96]);
+            assert!(at.product(&x, &mut jx, 1e-13) && at.product(&y, &mut jy, 1e-13));
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            (dot(&y, &jx) - dot(&x, &jy)).abs() / dot(&x, &jx).abs()
+        };
+        assert!(asymmetry(Form::Gradient) < 1e-11);
+        assert!(asymmetry(Form::Central) > 1e-4);
+    }
+
+    /// `ω_max` of the whole linear problem, by its own power iteration.
+    fn true_frequency(law: &ContactLaw, packing: &Packing, form: Form) -> f64 {
+        let mut linear = Linear::default();
+        let mut at = linear.at(form, law, packing);
+        let mut x = displacements(packing.len(), 0.7);
+        let mut y = vec![0.0; x.len()];
+        let mut eigenvalue = 0.0;
+        for _ in 0..200 {
+            let norm = x.iter().map(|v| v * v).sum::<f64>().sqrt();
+            x.iter_mut().for_each(|v| *v /= norm);
+            assert!(at.product(&x, &mut y, 1e-8));
+            eigenvalue = -x.iter().zip(&y).map(|(a, b)| a * b).sum::<f64>();
+            core::mem::swap(&mut x, &mut y);
+        }
+        eigenvalue.sqrt()
+    }
+
+    #[test]
+    fn estimate_of_the_largest_frequency_holds_for_both_forms() {
+        for form in [Form::Central, Form::Gradient] {
+            for phi in [0.86, 0.95, 1.1] {
+                let (packing, mut law) = packing(phi);
+                let whole = true_frequency(&law, &packing, form);
+                let estimate = largest_frequency(&packing, &mut law, 20).unwrap();
+                // dt_max ω_max = 1 by the estimate; 2 is the limit of stability.
+                assert!(
+                    whole < 1.25 * estimate,
+                    "{form:?}, φ = {phi}: ω_max = {whole}, estimated as {estimate}"
+                );
+            }
+        }
+    }
+}
