@@ -161,6 +161,44 @@ impl Observables {
         o
     }
 
+    /// These observables with the stress of the torques added: `σ_αβ −= (1/V) Σ_c τ_c ½ (t_α n_β + t_β n_α)`, with `t` the
+    /// normal turned by a quarter. It belongs to the [gradient form](Form::Gradient) and has no trace: energy and pressure
+    /// are those of the central form.
+    ///
+    /// ```
+    /// use softjam::{contact::Contacts, domain::{Domain, Vec2}, force::Observables};
+    ///
+    /// let contacts = Contacts {
+    ///     pairs: &[[0, 1]],
+    ///     normals: &[Vec2::new(-1.0, 0.0)],
+    ///     distances: &[0.9],
+    ///     overlaps: &[0.1],
+    ///     forces: &[0.4],
+    /// };
+    /// let domain = Domain::new(6.0, 6.0).unwrap();
+    /// let o = Observables::default().with_torques(&contacts, domain, 1.0, &[0.36]);
+    /// assert_eq!(o.stress, [0.0, -0.36 / 72.0, 0.0]);
+    /// ```
+    #[must_use]
+    pub fn with_torques(
+        mut self,
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        line_tension: f64,
+        torques: &[f64],
+    ) -> Self {
+        let mut sums = [0.0; 2];
+        for (n, torque) in contacts.normals.iter().zip(torques) {
+            sums[0] += torque * n.x * n.y;
+            sums[1] += 0.5 * torque * (n.x * n.x - n.y * n.y);
+        }
+        let scale = domain.area() * line_tension;
+        self.stress[0] += sums[0] / scale;
+        self.stress[1] -= sums[1] / scale;
+        self.stress[2] -= sums[0] / scale;
+        self
+    }
+
     /// The metrics as they are recorded, by name: one scalar each under `/metrics/`.
     ///
     /// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.

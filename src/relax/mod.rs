@@ -448,6 +448,12 @@ impl Relaxation {
             self.law.line_tension(),
             (self.f_max, self.state.dt),
         )
+        .with_torques(
+            &self.law.contacts(),
+            self.packing.domain(),
+            self.law.line_tension(),
+            self.form.torques(),
+        )
     }
 
     /// The contact law with its residual and its count of work.

@@ -8,6 +8,8 @@ mod contact_law;
 mod crystal;
 mod edge_cases;
 mod golden;
+mod gradient;
 mod matrix;
 mod model;
+mod newton;
 mod relaxation;
