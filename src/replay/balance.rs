@@ -8,7 +8,7 @@ use crate::contact::list::ContactList;
 use crate::contact::matrix::{ContactMatrix, Geometry};
 use crate::contact::{ContactError, ContactLaw, FrameContacts, Rule};
 use crate::domain::Vec2;
-use crate::force::{Observables, largest_force, net_forces};
+use crate::force::{NetForces, Observables, largest_force};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::record::Outcome;
@@ -55,6 +55,7 @@ impl Worst {
 #[derive(Clone, Debug)]
 pub struct Balance {
     law: ContactLaw,
+    form: NetForces,
     rule: Rule,
     threshold: f64,
     /// `max |A f − δ|` of the recorded forces: Saitoh (4).
@@ -93,6 +94,7 @@ impl Balance {
                 scene.line_tension,
                 scene.contact_tolerance.min(1e-12),
             ),
+            form: NetForces::new(scene.forces),
             rule: scene.contact_rule,
             threshold: scene.threshold,
             equation_4: Worst::default(),
@@ -139,7 +141,8 @@ impl Balance {
                 .of(if strongest > 0.0 { -f / strongest } else { -f }, step);
         }
         let mut net = vec![Vec2::zeros(); packing.len()];
-        net_forces(&view, &mut net);
+        let gamma = self.law.line_tension();
+        self.form.evaluate(&view, packing, gamma, &mut net);
         self.last = Some((step, largest_force(&net) / self.law.line_tension()));
         match self.law.solve(packing, &[], &[]) {
             Ok(()) => {

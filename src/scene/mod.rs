@@ -150,7 +150,8 @@ pub struct Scene {
     pub seed: u64,
     /// Line tension γ (force), positive. Default 1, which makes γ the unit of force.
     pub line_tension: f64,
-    /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10.
+    /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10. FIRE alone comes down to
+    /// about 1e-12, [`Minimizer::FireNewton`] to 1e-13 and below, both at the default contact tolerance.
     pub threshold: f64,
     /// The run ends at this step in any case. Default 200 000.
     pub steps: u64,

@@ -59,8 +59,7 @@ impl Linear {
         packing: &Packing,
     ) -> At<'a> {
         let contacts = law.contacts();
-        self.turning
-            .rebuild(&contacts, packing, law.line_tension());
+        self.turning.rebuild(&contacts, packing, law.line_tension());
         self.turning.torques(contacts.forces, &mut self.torques);
         At {
             buffers: self,
@@ -87,8 +86,7 @@ impl At<'_> {
         }
         b.right.clear();
         b.right.resize(b.stretch.len(), 0.0);
-        b.turning
-            .add_m(self.contacts.forces, &b.turn, &mut b.right);
+        b.turning.add_m(self.contacts.forces, &b.turn, &mut b.right);
         let mut largest: f64 = 0.0;
         for (r, d) in b.right.iter_mut().zip(&b.stretch) {
             *r = -(*r + d);
@@ -116,12 +114,10 @@ impl At<'_> {
         b.along.clear();
         b.along.extend_from_slice(&b.change);
         b.across.clear();
-        b.across.extend(
-            (forces.iter().zip(distances).zip(&b.turn)).map(|((f, r), turn)| f * r * turn),
-        );
+        b.across
+            .extend((forces.iter().zip(distances).zip(&b.turn)).map(|((f, r), turn)| f * r * turn));
         if self.form == Form::Gradient {
-            b.turning
-                .add_m_transposed(forces, &b.change, &mut b.across);
+            b.turning.add_m_transposed(forces, &b.change, &mut b.across);
             b.turning.add_s(forces, &b.turn, &mut b.across);
             for (c, torque) in b.torques.iter().enumerate() {
                 let per_length = torque / distances[c];

@@ -48,12 +48,7 @@ impl Stiffness {
             }
             self.pointers.push(self.rows.len() as u32);
         }
-        for ((&[i, j], n), a) in contacts
-            .pairs
-            .iter()
-            .zip(contacts.normals)
-            .zip(compliances)
-        {
+        for ((&[i, j], n), a) in contacts.pairs.iter().zip(contacts.normals).zip(compliances) {
             let block = outer(*n, 1.0 / a);
             for p in [i, j] {
                 let diagonal = &mut self.blocks[self.pointers[p as usize] as usize];
@@ -75,5 +70,8 @@ impl Stiffness {
 }
 
 fn outer(n: Vec2, k: f64) -> Block {
-    [[k * n.x * n.x, k * n.x * n.y], [k * n.x * n.y, k * n.y * n.y]]
+    [
+        [k * n.x * n.x, k * n.x * n.y],
+        [k * n.x * n.y, k * n.y * n.y],
+    ]
 }

@@ -13,12 +13,7 @@ use softjam::scene::{Minimizer, Scene};
 
 /// The contact law to round-off.
 fn exact(packing: &Packing) -> ContactLaw {
-    let mut law = ContactLaw::new(
-        Rule::Complementarity,
-        Method::ConjugateGradient,
-        1.0,
-        1e-14,
-    );
+    let mut law = ContactLaw::new(Rule::Complementarity, Method::ConjugateGradient, 1.0, 1e-14);
     law.solve(packing, &[], &[]).unwrap();
     law
 }
@@ -115,7 +110,11 @@ fn forms_differ_by_second_order_in_the_forces() {
             net(&law, &packing, Form::Gradient),
         );
         let apart: Vec<Vec2> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-        let strongest = law.contacts().forces.iter().fold(0.0, |m: f64, f| m.max(*f));
+        let strongest = law
+            .contacts()
+            .forces
+            .iter()
+            .fold(0.0, |m: f64, f| m.max(*f));
         let relative = largest(&apart) / strongest;
         println!("phi {phi}: strongest contact {strongest:.4}, difference over it {relative:.5}");
         assert!(relative < last, "φ = {phi}");
@@ -139,7 +138,9 @@ fn total_force_and_torque_are_zero() {
         let positions: Vec<Vec2> = (0..24)
             .map(|k| {
                 let place = Vec2::new(f64::from(k % 5), f64::from(k / 5)) * 0.98;
-                place + Vec2::new(5.0, 5.0) + Vec2::new(random.within(-0.1, 0.1), random.within(-0.1, 0.1))
+                place
+                    + Vec2::new(5.0, 5.0)
+                    + Vec2::new(random.within(-0.1, 0.1), random.within(-0.1, 0.1))
             })
             .collect();
         let packing =

@@ -86,7 +86,11 @@ fn newton_converges_quadratically_from_a_millionth() {
             // most 1e-13 is round-off.
             for pair in sequence.windows(2).filter(|pair| pair[1] > 1e-13) {
                 let second_order = pair[1] / (pair[0] * pair[0]);
-                assert_at_most("f_max after a step, units of its square", second_order, most);
+                assert_at_most(
+                    "f_max after a step, units of its square",
+                    second_order,
+                    most,
+                );
             }
         }
     }
@@ -192,10 +196,7 @@ fn a_frame_keeps_the_turns_and_plain_fire_has_none() {
     assert_eq!(values.len(), 9);
     assert_eq!(values[6], f64::from(count.kept));
     assert!(run.frame().velocities.iter().all(|v| *v == Vec2::zeros()));
-    assert_eq!(
-        FireState::from_values(&values),
-        Some(run.frame().minimizer)
-    );
+    assert_eq!(FireState::from_values(&values), Some(run.frame().minimizer));
     for wrong in [
         values[..8].to_vec(),
         [&values[..6], &[0.0; 3]].concat(),
@@ -279,7 +280,11 @@ fn five_particles_held_by_their_own_images_are_finished() {
                 Ok(_) => run_to_the_end(&finishing(particles, 0.9, seed)),
                 Err(_) => continue,
             };
-            assert_eq!(run.status(), Status::Converged, "N = {particles}, seed {seed}");
+            assert_eq!(
+                run.status(),
+                Status::Converged,
+                "N = {particles}, seed {seed}"
+            );
             jammed += u32::from(run.observables().pressure() > 1e-3);
         }
     }
