@@ -4,5 +4,6 @@
 //! forces its contour is the circle plus one copy of the kernel [`kernel::g`] for each contact force,
 //! Saitoh (1)–(3).
 
+mod angle;
 pub mod contour;
 pub mod kernel;

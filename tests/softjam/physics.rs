@@ -13,3 +13,4 @@ mod matrix;
 mod model;
 mod newton;
 mod relaxation;
+mod work;
