@@ -3,6 +3,10 @@
 //! Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 856 (1986): modified Gram–Schmidt, Givens rotations, no
 //! restart. The residual that is minimised is the true one, `|b − J x|`.
 
+/// The part of the tolerance that the products may use up, and the least accuracy of a product.
+const SHARE: f64 = 0.1;
+const LOOSEST: f64 = 0.05;
+
 /// What [`Gmres::solve`] came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Report {
@@ -23,8 +27,12 @@ pub(super) struct Gmres {
 }
 
 impl Gmres {
-    /// Solves `J x = b` to `|b − J x| ≤ tolerance |b|`, with at most `most` products; `product(v, w)` sets `w = J P⁻¹ v`
-    /// and says whether it could. The answer is `x = P⁻¹ y`; `y` is put into `y`.
+    /// Solves `J x = b` to `|b − J x| ≤ tolerance |b|`, with at most `most` products; `product(v, w, accuracy)` sets
+    /// `w = J P⁻¹ v`, right to `accuracy` at least, and says whether it could. The answer is `x = P⁻¹ y`; `y` is put into
+    /// `y`.
+    ///
+    /// Products may become less exact as the residual falls (V. Simoncini and D. B. Szyld, SIAM J. Sci. Comput. 25, 454
+    /// (2003)): `accuracy` is [`SHARE`] of the tolerance over the residual.
     ///
     /// `None` when a product failed or a number is not finite.
     pub(super) fn solve(
@@ -33,7 +41,7 @@ impl Gmres {
         y: &mut [f64],
         tolerance: f64,
         most: usize,
-        mut product: impl FnMut(&[f64], &mut [f64]) -> bool,
+        mut product: impl FnMut(&[f64], &mut [f64], f64) -> bool,
     ) -> Option<Report> {
         let n = b.len();
         y.fill(0.0);
@@ -58,7 +66,8 @@ impl Gmres {
             self.vector(k + 1, n);
             let (known, new) = self.basis.split_at_mut(k + 1);
             let w = &mut new[0];
-            if !product(&known[k], w) {
+            let accuracy = (SHARE * tolerance / report.residual).min(LOOSEST);
+            if !product(&known[k], w, accuracy) {
                 return None;
             }
             report.iterations += 1;

@@ -283,10 +283,10 @@ impl Newton {
             &mut self.step,
             tolerance,
             MOST_PRODUCTS,
-            |v, w| {
+            |v, w, accuracy| {
                 scratch.copy_from_slice(v);
                 stiffness.solve(scratch);
-                linear.product(scratch, w, INNER * tolerance)
+                linear.product(scratch, w, accuracy)
             },
         ) else {
             return false;
@@ -311,9 +311,6 @@ const MOST_PRODUCTS: usize = 150;
 
 /// The residual of the contact law, relative to the largest overlap, below which forces are taken as they are.
 const EXACT: f64 = 1e-12;
-
-/// The contact problem inside a product is solved to this fraction of what is asked of the whole.
-const INNER: f64 = 0.1;
 
 /// In how many pairs two lists, both ascending, differ.
 fn exchanged(a: &[[u32; 2]], b: &[[u32; 2]]) -> usize {
