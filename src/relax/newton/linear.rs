@@ -276,7 +276,9 @@ mod tests {
         let mut eigenvalue = 0.0;
         for _ in 0..200 {
             let norm = x.iter().map(|v| v * v).sum::<f64>().sqrt();
-            x.iter_mut().for_each(|v| *v /= norm);
+            for v in &mut x {
+                *v /= norm;
+            }
             assert!(at.product(&x, &mut y, 1e-8));
             eigenvalue = -x.iter().zip(&y).map(|(a, b)| a * b).sum::<f64>();
             core::mem::swap(&mut x, &mut y);

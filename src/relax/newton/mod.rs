@@ -18,10 +18,11 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | φ = 0.845 | 9.7e-7 → 3.4e-8 → 4.0e-13 → 3.0e-15 |
-//! | φ = 0.86 | 9.8e-7 → 1.2e-10 → 7.1e-15 |
-//! | φ = 0.90 | 9.6e-7 → 9.7e-10 → 3.1e-15 |
-//! | φ = 1.00 | 8.7e-7 → 7.6e-11 → 7.9e-15 |
+//! | central, φ = 0.845 | 9.8e-7 → 6.2e-8 → 1.9e-12 → 1.0e-14 |
+//! | central, φ = 0.86 | 9.7e-7 → 1.6e-10 → 8.2e-15 |
+//! | central, φ = 0.90 | 9.3e-7 → 1.7e-8 → 2.2e-14 |
+//! | central, φ = 1.00 | 9.9e-7 → 2.0e-10 → 7.2e-15 |
+//! | gradient, φ = 0.90 | 9.2e-7 → 2.9e-10 → 2.8e-15 |
 //!
 //! **One step is one frame, and nothing is remembered.** No history of steps, no lagged factorisation: a step is a
 //! function of positions, contacts and forces alone, so a run goes on from any frame with the same bits. (The ordering of
@@ -94,8 +95,9 @@ const LONGEST_PAUSE: u32 = 4;
 
 /// Newton's method is tried when `f_max` is not above this fraction of the mean contact force, whatever the scene.
 ///
-/// Measured at N = 256, ten seeds each: with 1e-2, 1e-3, 3e-4 and 1e-4 a run at φ = 0.86 takes 1320, 1255, 1279 and 1324 steps
-/// in all, with 2.7, 0.7, 0.1 and 0 attempts given up; at φ = 1.0 it takes 361, 343, 360 and 402 with 1.7, 0.5, 0.2 and 0.
+/// Measured at N = 256, ten seeds each, to `f_max` of 1e-13: with 1e-2, 1e-3, 5e-4 and 1e-4 a run at φ = 0.86 takes 1276, 1236,
+/// 1266 and 1312 steps in all with 2.6, 0.6, 0.3 and 0 attempts given up, at φ = 1.0 it takes 366, 347, 363 and 399 with 1.7,
+/// 0.5, 0.3 and 0.
 const SWITCH: f64 = 5e-4;
 
 /// A step is kept if it brings `|F|` to this fraction of what it was, or less.

@@ -159,9 +159,9 @@ fn total_force_and_torque_are_zero() {
 #[test]
 fn energy_is_conserved_with_an_error_of_second_order_in_the_time_step() {
     /// The largest error of the energy over a run by velocity Verlet, and how often the contacts changed.
-    fn run(form: Form, dt: f64) -> (f64, u32) {
-        let mut packing = relaxed_disks(32, 0.90, 4);
-        let mut random = Random::new(8);
+    fn run(form: Form, dt: f64, seed: u64) -> (f64, u32) {
+        let mut packing = relaxed_disks(32, 0.90, seed);
+        let mut random = Random::new(seed);
         let mut velocities: Vec<Vec2> = (0..packing.len())
             .map(|_| Vec2::new(random.within(-0.05, 0.05), random.within(-0.05, 0.05)))
             .collect();
@@ -189,19 +189,28 @@ fn energy_is_conserved_with_an_error_of_second_order_in_the_time_step() {
         }
         (worst, changes)
     }
-    let errors: Vec<(f64, u32)> = [0.04, 0.02, 0.01, 0.005]
-        .map(|dt| run(Form::Gradient, dt))
-        .into();
-    for (k, pair) in errors.windows(2).enumerate() {
-        println!("halving {k}: {:.3e} -> {:.3e}", pair[0].0, pair[1].0);
-        assert!(pair[1].1 > 10, "contacts change on the way: {}", pair[1].1);
-    }
-    let exponent = (errors[0].0 / errors[3].0).log2() / 3.0;
-    assert_within("exponent of the error of the energy", exponent, 1.8, 2.2);
+    // The largest error of a run depends on when contacts change; the mean over several runs hardly does.
+    let seeds = 1..=12;
+    let mean = |form: Form, dt: f64| {
+        let mut sum = 0.0;
+        for seed in seeds.clone() {
+            let (error, changes) = run(form, dt, seed);
+            assert!(changes > 10, "contacts change on the way: {changes}");
+            sum += error;
+        }
+        sum / seeds.clone().count() as f64
+    };
+    let errors = [0.04, 0.02, 0.01].map(|dt| mean(Form::Gradient, dt));
+    println!(
+        "gradient form: {:.3e} {:.3e} {:.3e}",
+        errors[0], errors[1], errors[2]
+    );
+    let exponent = (errors[0] / errors[2]).log2() / 2.0;
+    assert_within("exponent of the error of the energy", exponent, 1.85, 2.15);
     // With the central form there is an error that no time step takes away.
-    let (coarse, fine) = (run(Form::Central, 0.02).0, run(Form::Central, 0.005).0);
+    let (coarse, fine) = (mean(Form::Central, 0.02), mean(Form::Central, 0.01));
     println!("central form: {coarse:.3e} -> {fine:.3e}");
-    assert!(fine > 0.5 * coarse && fine > 10.0 * errors[3].0);
+    assert!(fine > 0.5 * coarse && fine > 10.0 * errors[2]);
 }
 
 /// `packing` with box and centres, not radii, stretched.
