@@ -77,6 +77,24 @@ pub struct FireState {
 }
 
 impl FireState {
+    /// The names of the recorded [`values`](Self::values), in their order.
+    ///
+    /// ```
+    /// # use softjam::relax::fire::FireState;
+    /// assert_eq!(FireState::NAMES[1], "dt_max");
+    /// ```
+    pub const NAMES: [&str; 9] = [
+        "dt",
+        "dt_max",
+        "alpha",
+        "downhill",
+        "moves",
+        "time",
+        "newton_moves",
+        "newton_failures",
+        "newton_wait",
+    ];
+
     /// The state at the start of a relaxation with the given bound of the time step.
     ///
     /// ```
