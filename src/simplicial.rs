@@ -29,6 +29,7 @@ pub(crate) struct Simplicial<const BLOCK: usize> {
     scalar_rows: Vec<u32>,
     scalar_values: Vec<f64>,
     factor: Vec<f64>,
+    analyses: u64,
 }
 
 /// There is no factor: the index of the pivot that is not positive, or 0 where memory was short.
@@ -106,7 +107,13 @@ impl<const BLOCK: usize> Simplicial<BLOCK> {
         );
     }
 
+    /// How often a pattern was analysed.
+    pub(crate) fn analyses(&self) -> u64 {
+        self.analyses
+    }
+
     fn analyze(&mut self, pointers: &[u32], rows: &[u32]) -> Result<(), NotPositive> {
+        self.analyses += 1;
         let n = pointers.len().saturating_sub(1);
         self.symbolic = None;
         self.pointers = pointers.to_vec();
