@@ -321,6 +321,13 @@ fn all_solvers_rules_and_tensions_are_finished() {
             assert_eq!(run.status(), Status::Converged, "{contact_solver:?}");
         }
     }
+    for contact_tolerance in [1e-6, 1e-14] {
+        let (run, _) = run_to_the_end(&Scene {
+            contact_tolerance,
+            ..finishing(64, 0.9, 3)
+        });
+        assert_eq!(run.status(), Status::Converged, "{contact_tolerance:e}");
+    }
     let (at_one, one) = run_to_the_end(&finishing(64, 0.9, 3));
     for line_tension in [0.25, 4.0, 2f64.powi(-40)] {
         let (run, count) = run_to_the_end(&Scene {
