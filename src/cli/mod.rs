@@ -6,12 +6,13 @@ mod convert;
 mod figure;
 mod flags;
 mod info;
+mod manual;
 mod output;
 mod record;
 mod replay;
 mod scene;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use softjam::convert::ConvertError;
 use softjam::figure::FigureError;
 use softjam::record::RecordError;
@@ -47,6 +48,8 @@ enum Verb {
     Convert(convert::Arguments),
     /// Draw a packing, or the fall of f_max, as SVG or PNG.
     Figure(figure::Arguments),
+    /// Write the manual pages, or print the completions of a shell.
+    Manual(manual::Arguments),
     /// Print a scene file: the default one, or a file and flags with every field filled in.
     Scene(scene::Arguments),
 }
@@ -74,6 +77,7 @@ pub fn run() -> ExitCode {
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Convert(arguments) => convert::run(&arguments),
         Verb::Figure(arguments) => figure::run(&arguments),
+        Verb::Manual(arguments) => manual::run(&arguments, &Cli::command()),
         Verb::Scene(arguments) => scene::run(&arguments),
     };
     match result {
