@@ -295,7 +295,9 @@ impl Newton {
         };
         stiffness.solve(&mut self.step);
         let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
-        if residual > KEPT || downhill.is_nan() || downhill <= 0.0 {
+        // A NaN is no step either.
+        let worth_trying = residual <= KEPT && downhill > 0.0;
+        if !worth_trying {
             return false;
         }
         if !linear.forces(&self.step, 1e-8) {
@@ -309,7 +311,7 @@ impl Newton {
 }
 
 /// Products with `J` in one step.
-const MOST_PRODUCTS: usize = 150;
+const MOST_PRODUCTS: usize = 100;
 
 /// The residual of the contact law, relative to the largest overlap, below which forces are taken as they are.
 const EXACT: f64 = 1e-12;
