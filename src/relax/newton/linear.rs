@@ -293,7 +293,6 @@ mod tests {
                 let (packing, mut law) = packing(phi);
                 let whole = true_frequency(&law, &packing, form);
                 let estimate = largest_frequency(&packing, &mut law, 20).unwrap();
-                println!("{form:?}, φ = {phi}: {}", whole / estimate);
                 // dt_max ω_max = 1 by the estimate; 2 is the limit of stability.
                 assert!(
                     whole < 1.25 * estimate,
