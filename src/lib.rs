@@ -36,7 +36,7 @@
 //! ```
 //!
 //! Which pairs touch follows from `f ≥ 0`, `gap ≥ 0`, `f · gap = 0`. The forces act along the lines of centres, and FIRE
-//! moves the particles until no net force is larger than the threshold.
+//! moves the particles until no net force is larger than the threshold; Newton's method can finish.
 //!
 //! # Units
 //!

@@ -31,7 +31,7 @@ use crate::frame::{Frame, FrameError};
 use crate::packing::Packing;
 use crate::scene::{Minimizer, Scene, SceneError, start};
 use fire::{Fire, FireState};
-use newton::Newton;
+use newton::{Attempt, Newton};
 
 /// How a relaxation stands.
 ///
@@ -286,7 +286,10 @@ impl Relaxation {
         let Some(newton) = &mut self.newton else {
             return false;
         };
-        if !Newton::is_due(self.f_max, &self.law) {
+        // Only Newton's method leaves the particles at rest.
+        let goes_on =
+            self.state.turns.moves > 0 && self.velocities.iter().all(|v| *v == Vec2::zeros());
+        if !Newton::is_due(self.f_max, &self.law, goes_on) {
             return false;
         }
         let turns = &mut self.state.turns;
@@ -294,15 +297,17 @@ impl Relaxation {
             turns.wait -= 1;
             return false;
         }
-        let kept = newton.advance(
+        let attempt = newton.advance(
             &mut self.packing,
             &mut self.law,
             &mut self.form,
             &self.net,
             (self.f_max, self.threshold),
+            turns.is_patient(),
         );
+        let kept = attempt != Attempt::GivenUp;
         if kept {
-            turns.succeed();
+            turns.succeed(attempt == Attempt::Halved);
             self.state.restart(&self.fire);
             self.velocities.fill(Vec2::zeros());
         } else {

@@ -4,7 +4,7 @@
 //! Newton's method converges quadratically. A step solves the coupled problem in `(r, f)`, linearised at a frame,
 //!
 //! ```text
-//! A Δf + (dA) f + Δr-part of −dδ = δ − A f,       dF of (Δr, Δf) = −F
+//! A Δf + (∂A/∂r Δr) f − ∂δ/∂r Δr = δ − A f,        ∂F/∂r Δr + ∂F/∂f Δf = −F
 //! ```
 //!
 //! with `Δf` eliminated: `J Δr = −F`, `J` being the derivative of the net forces with the contact problem solved inside
@@ -35,7 +35,9 @@
 //! settled so at the first or second try, where a shortened step would flip between two sets.
 //!
 //! **Nothing is forced.** `F` need not be the gradient of anything, so a step is judged by `|F|`, the root of the sum of
-//! squares of the net forces: it is kept if `|F|` falls to one half or less. A step against the forces (`F·Δr ≤ 0`) would climb
+//! squares of the net forces: it is kept if `|F|` falls to one half or less. A step along a soft mode leaves forces of second
+//! order in stiff directions, which the next step takes away; it is kept as well, some times on end, if the contacts stay
+//! and the distance `|K̃⁻¹ F|` that the forces stand for falls to one half. A step against the forces (`F·Δr ≤ 0`) would climb
 //! to a saddle and is not tried, nor one whose linear problem is not solved. A step given up leaves the frame as it was;
 //! FIRE makes the move instead, and 50 moves and more before the next attempt, up to 800 after repeated failure. Rattlers
 //! without contacts have `F = 0` and stay where they are; a packing that comes apart ends with `f_max = 0` like with FIRE
@@ -69,7 +71,7 @@ use stiffness::Stiffness;
 pub struct Turns {
     /// Steps of Newton's method that were kept.
     pub moves: u32,
-    /// Attempts given up since the last one that was kept.
+    /// Attempts since the last one that halved `|F|`: given up, or kept all the same.
     pub failures: u32,
     /// Moves that FIRE has still to make before the next attempt.
     pub wait: u32,
@@ -82,10 +84,19 @@ impl Turns {
         self.failures = self.failures.saturating_add(1);
     }
 
-    /// An attempt was kept.
-    pub(super) fn succeed(&mut self) {
+    /// An attempt was kept, since it halved `|F|` or only since it came nearer.
+    pub(super) fn succeed(&mut self, halved: bool) {
         self.moves = self.moves.saturating_add(1);
-        self.failures = 0;
+        self.failures = if halved {
+            0
+        } else {
+            self.failures.saturating_add(1)
+        };
+    }
+
+    /// Whether a step that does not halve `|F|` may be kept: not many times on end.
+    pub(super) fn is_patient(self) -> bool {
+        self.failures < PATIENCE
     }
 }
 
@@ -95,13 +106,19 @@ const LONGEST_PAUSE: u32 = 4;
 
 /// Newton's method is tried when `f_max` is not above this fraction of the mean contact force, whatever the scene.
 ///
-/// Measured at N = 256, ten seeds each, to `f_max` of 1e-13: with 1e-2, 1e-3, 5e-4 and 1e-4 a run at φ = 0.86 takes 1276, 1236,
-/// 1266 and 1312 steps in all with 2.6, 0.6, 0.3 and 0 attempts given up, at φ = 1.0 it takes 366, 347, 363 and 399 with 1.7,
-/// 0.5, 0.3 and 0.
+/// Measured to `f_max` of 1e-13, N = 256, ten seeds each: with 2e-3, 1e-3 and 5e-4 a run at φ = 0.86 takes 1173, 1222 and 1256
+/// steps in all with 0.6, 0.4 and 0.2 attempts given up, at φ = 1.0 it takes 312, 335 and 363 with 0.5, 0.3 and 0.3. To 1e-12,
+/// N = 1024, five seeds, φ = 0.86: 2200, 2176 and 2014 with 2.6, 1.8 and 0.2.
 const SWITCH: f64 = 5e-4;
 
 /// A step is kept if it brings `|F|` to this fraction of what it was, or less.
 const KEPT: f64 = 0.5;
+
+/// How many attempts may fail to halve `|F|`, one after the other, before only halving counts.
+const PATIENCE: u32 = 6;
+
+/// A step that comes nearer is kept if `|F|` grows to this multiple at most.
+const GROWTH: f64 = 10.0;
 
 /// How often a step is computed anew on the contact set that the last one ran into.
 const CORRECTIONS: u32 = 3;
@@ -111,6 +128,17 @@ const MOST_EXCHANGED: usize = 4;
 
 /// The longest displacement of a particle in one step, in units of the smallest radius.
 const LONGEST: f64 = 0.1;
+
+/// What became of an attempt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Attempt {
+    /// Kept: `|F|` is half of what it was, or less.
+    Halved,
+    /// Kept: `|F|` is not, but the distance that it stands for is.
+    Nearer,
+    /// Not kept.
+    GivenUp,
+}
 
 /// Newton's method with its buffers; they hold nothing that one step hands to the next.
 #[derive(Clone, Debug, Default)]
@@ -132,17 +160,19 @@ pub(super) struct Newton {
 }
 
 impl Newton {
-    /// Whether `f_max` (units of γ) is low enough for an attempt.
-    pub(super) fn is_due(f_max: f64, law: &ContactLaw) -> bool {
+    /// Whether `f_max` (units of γ) is low enough for an attempt; right behind a step that was kept (`goes_on`) it may have
+    /// grown.
+    pub(super) fn is_due(f_max: f64, law: &ContactLaw, goes_on: bool) -> bool {
+        let most = if goes_on { GROWTH * SWITCH } else { SWITCH };
         let forces = law.contacts().forces;
         let sum: f64 = forces.iter().sum();
-        f_max * law.line_tension() * forces.len() as f64 <= SWITCH * sum
+        f_max * law.line_tension() * forces.len() as f64 <= most * sum
     }
 
     /// Tries one step from the contacts and forces of `law` at the positions of `packing`, whose net forces are `net`.
     ///
-    /// If the step is kept, `packing` and `law` are at its end and the answer is `true`; otherwise they are as they were.
-    /// `goal` is the `f_max` (units of γ) below which nothing more is asked for.
+    /// If the step is kept, `packing` and `law` are at its end; otherwise they are as they were. `goal` is the `f_max` (units
+    /// of γ) below which nothing more is asked for; `patient` allows [`Attempt::Nearer`].
     pub(super) fn advance(
         &mut self,
         packing: &mut Packing,
@@ -150,7 +180,8 @@ impl Newton {
         form: &mut NetForces,
         net: &[Vec2],
         (f_max, goal): (f64, f64),
-    ) -> bool {
+        patient: bool,
+    ) -> Attempt {
         self.pairs.clear();
         self.pairs.extend_from_slice(law.contacts().pairs);
         self.forces.clear();
@@ -176,10 +207,13 @@ impl Newton {
             }
             form.evaluate(&law.contacts(), packing, law.line_tension(), &mut self.net);
             if length(&self.net) <= KEPT * before {
-                return true;
+                return Attempt::Halved;
+            }
+            let exchanged = exchanged(&self.piece, law.contacts().pairs);
+            if patient && exchanged == 0 && self.is_nearer(net, before) {
+                return Attempt::Nearer;
             }
             packing.positions_mut().copy_from_slice(&self.positions);
-            let exchanged = exchanged(&self.piece, law.contacts().pairs);
             if correction == CORRECTIONS
                 || !(1..=MOST_EXCHANGED).contains(&exchanged)
                 || !self.change_piece(packing, law)
@@ -190,7 +224,29 @@ impl Newton {
         }
         packing.positions_mut().copy_from_slice(&self.positions);
         law.restore(packing, &self.pairs, &self.forces);
-        false
+        Attempt::GivenUp
+    }
+
+    /// Whether the net forces at the end of a step stand for half the distance of those at its start, or less, measured by
+    /// the stiffness of the step: `|K̃⁻¹ F|`.
+    ///
+    /// Along a soft mode a small force means a long way, and going it leaves forces of second order in stiff directions,
+    /// which are large and mean next to nothing (P. Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, calls such a
+    /// test natural).
+    fn is_nearer(&mut self, net: &[Vec2], before: f64) -> bool {
+        if length(&self.net) > GROWTH * before {
+            return false;
+        }
+        let stiffness = &self.stiffness;
+        let scratch = &mut self.scratch;
+        let mut distance = |forces: &[Vec2]| {
+            scratch.clear();
+            scratch.extend(forces.iter().flat_map(|f| [f.x, f.y]));
+            stiffness.solve(scratch);
+            gmres::norm(scratch)
+        };
+        let start = distance(net);
+        distance(&self.net) <= KEPT * start
     }
 
     /// Moves the particles from `positions` by `step`, shortened if it is too long; returns the part of it that was made.
@@ -295,7 +351,9 @@ impl Newton {
         };
         stiffness.solve(&mut self.step);
         let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
-        if residual > KEPT || downhill.is_nan() || downhill <= 0.0 {
+        // A NaN is no step either.
+        let worth_trying = residual <= KEPT && downhill > 0.0;
+        if !worth_trying {
             return false;
         }
         if !linear.forces(&self.step, 1e-8) {
@@ -309,7 +367,7 @@ impl Newton {
 }
 
 /// Products with `J` in one step.
-const MOST_PRODUCTS: usize = 150;
+const MOST_PRODUCTS: usize = 100;
 
 /// The residual of the contact law, relative to the largest overlap, below which forces are taken as they are.
 const EXACT: f64 = 1e-12;

@@ -261,8 +261,7 @@ fn few_particles_unjammed_ones_and_rattlers_end_as_they_should() {
 }
 
 #[test]
-fn five_particles_held_by_their_own_images_are_finished() {
-    // Jammed across the periodic box: the fewest that the box allows.
+fn the_fewest_particles_that_can_jam_across_the_box_are_finished() {
     let mut jammed = 0;
     for particles in [10, 12, 16] {
         for seed in 1..=10 {
