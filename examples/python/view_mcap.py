@@ -59,7 +59,7 @@ def packing(l_x, l_y):
 
 def box(path):
     """Sides of the periodic box."""
-    for chunk in McapReader(path, include_topic_regex=["^/particles$"]).stream().to_chunks():
+    for chunk in McapReader(path, include_topic_regex=["^/particles$"], recover=True).stream().to_chunks():
         batch = chunk.to_record_batch()
         if "softjam.v1.Particles:message" in batch.schema.names:
             return batch["softjam.v1.Particles:message"][0].as_py()[0]["box"]
@@ -86,5 +86,6 @@ if __name__ == "__main__":
     stream.send_blueprint(blueprint)
     # The vertices name the frame of reference they are in; the other topics have to be put into the same one.
     stream.log("/world/contours", rr.CoordinateFrame("world"), static=True)
-    stream.log_file_from_path(arguments.recording)
+    # A recording that was cut off is shown as far as it goes.
+    stream.send_chunks(McapReader(arguments.recording, recover=True).stream())
     stream.flush()

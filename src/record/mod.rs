@@ -63,7 +63,12 @@ pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_V
 /// ```
 #[must_use]
 pub fn recording_id(scene: &Scene) -> String {
-    blake3::Hash::from_bytes(scene.digest()).to_hex()[..32].to_owned()
+    id_of(scene.digest())
+}
+
+/// The id of a recording of a scene whose text has this BLAKE3.
+pub(crate) fn id_of(digest: [u8; 32]) -> String {
+    blake3::Hash::from_bytes(digest).to_hex()[..32].to_owned()
 }
 
 /// What a recording says of itself before its first frame.

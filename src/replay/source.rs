@@ -79,12 +79,13 @@ pub(super) fn check_version(path: &str, found: u32) -> Result<(), ReadError> {
     Ok(())
 }
 
-/// The scene in a file.
-pub(super) fn read_scene(path: &str, toml: &str) -> Result<Scene, ReadError> {
-    Scene::from_toml(toml).map_err(|source| ReadError::Scene {
+/// The scene in a file, and the BLAKE3 of its text as it stands there: a version that prints scenes otherwise reads on.
+pub(super) fn read_scene(path: &str, toml: &str) -> Result<(Scene, [u8; 32]), ReadError> {
+    let scene = Scene::from_toml(toml).map_err(|source| ReadError::Scene {
         path: path.to_owned(),
         source,
-    })
+    })?;
+    Ok((scene, *blake3::hash(toml.as_bytes()).as_bytes()))
 }
 
 /// Radii and box, or what is missing of them.

@@ -144,8 +144,8 @@ fn read_about(path: &str, metadata: &BTreeMap<String, String>) -> Result<Option<
 
 /// The scene, which has to be the one that the recording was made of.
 fn checked_scene(path: &str, about: &About, toml: &str) -> Result<Scene, ReadError> {
-    let scene = read_scene(path, toml)?;
-    let expected = blake3::Hash::from_bytes(scene.digest()).to_hex();
+    let (scene, digest) = read_scene(path, toml)?;
+    let expected = blake3::Hash::from_bytes(digest).to_hex();
     if about.scene_digest == expected.as_str() {
         Ok(scene)
     } else {

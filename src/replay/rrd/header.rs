@@ -3,7 +3,7 @@
 use super::not_rrd;
 use super::stream::{Message, Stream};
 use crate::domain::Domain;
-use crate::record::recording_id;
+use crate::record::id_of;
 use crate::replay::ReadError;
 use crate::replay::source::{Header, check_version, guarded, particles, read_scene};
 use crate::scene::Scene;
@@ -13,6 +13,8 @@ use rerun::log::Chunk;
 /// What `/scene` holds.
 struct About {
     scene: Scene,
+    /// The recording's id, as its scene makes it.
+    id: String,
     program: String,
     from_step: u64,
 }
@@ -41,10 +43,10 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
             "/particles" => {
                 let About {
                     scene,
+                    id,
                     program,
                     from_step,
                 } = about.ok_or(missing("scene"))?;
-                let id = recording_id(&scene);
                 if store.recording_id().as_str() != id {
                     return Err(ReadError::Changed {
                         path: path.to_owned(),
@@ -82,10 +84,11 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
     let Some(toml) = text("softjam.Scene:toml") else {
         return Ok(None);
     };
-    let scene = read_scene(path, &toml)?;
+    let (scene, digest) = read_scene(path, &toml)?;
     let mut from_steps = chunk.iter_slices::<u64>("softjam.Scene:from_step".into());
     Ok(Some(About {
         scene,
+        id: id_of(digest),
         program: text("softjam.Scene:program").unwrap_or_default(),
         from_step: from_steps
             .next()
