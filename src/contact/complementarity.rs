@@ -18,6 +18,7 @@
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
+use super::images::second_image;
 use super::law::{ContactError, ContactLaw};
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
@@ -143,18 +144,23 @@ impl ContactLaw {
             .update(packing, 2.0 * largest, skin + largest);
     }
 
-    /// Two images of one neighbour are at least half a side apart: no particle may reach farther than a quarter.
+    /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
-        let shortest = packing.domain().shortest();
-        for (particle, (bulge, radius)) in self.bulges.iter().zip(packing.radii()).enumerate() {
-            let reach = radius + bulge;
-            if 4.0 * reach > shortest {
-                return Err(ContactError::BoxTooSmall {
-                    particle,
-                    reach,
-                    shortest,
-                });
-            }
+        let reach = |p: usize| packing.radii()[p] + self.bulges[p];
+        let scale = self.scale();
+        if let Some((particle, other)) = second_image(
+            packing,
+            &self.contacts(),
+            self.line_tension,
+            reach,
+            self.accepted_residual() * scale,
+        ) {
+            return Err(ContactError::BoxTooSmall {
+                particle,
+                other,
+                reach: reach(particle),
+                shortest: packing.domain().shortest(),
+            });
         }
         if let Some((particle, bulge)) = self.absurd {
             return Err(ContactError::Absurd {

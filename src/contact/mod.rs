@@ -21,6 +21,7 @@
 //! added behind it.
 
 pub mod complementarity;
+mod images;
 mod law;
 pub mod list;
 pub mod matrix;
