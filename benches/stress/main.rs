@@ -1,40 +1,81 @@
-//! The stress program; see `docs/stress.md`, which it writes.
+//! The stress program: many hard cases, each answer checked by formulas that the solver does not share.
+//!
+//! ```sh
+//! cargo bench --no-default-features --bench stress -- --write docs/stress.md   # everything, and the report
+//! cargo bench --no-default-features --bench stress -- lattice threshold        # some families
+//! ```
+//!
+//! Every case has to end converged, at its step limit or with a named error, and what it says must be true: the contact
+//! law, the balance and the reason of an error are computed anew in `verify.rs`. The exit code is 1 if a case is wrong.
+
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    clippy::expect_used,
+    reason = "a program that prints its findings and makes its own packings"
+)]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the checks use the standard library's mathematics on purpose: nothing is shared with the crate"
+)]
+
 mod families;
 mod hand_made;
 mod outcome;
 mod random;
+mod report;
 mod verify;
 
+use report::Row;
+use std::process::ExitCode;
 use std::time::Instant;
 
-fn main() {
-    let only: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+fn main() -> ExitCode {
+    let mut only: Vec<String> = Vec::new();
+    let mut file = None;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            // What `cargo bench` passes on to every bench.
+            "--bench" => {}
+            "--write" => file = arguments.next(),
+            _ => only.push(argument),
+        }
+    }
+    // A panic is counted, not printed.
+    std::panic::set_hook(Box::new(|_| {}));
+    let mut rows = Vec::new();
     for family in families::all() {
         if !only.is_empty() && !only.iter().any(|o| family.name.contains(o.as_str())) {
             continue;
         }
+        eprintln!("{}: {}", family.name, family.what);
         let clock = Instant::now();
-        let mut ends = std::collections::BTreeMap::<&str, (usize, u64)>::new();
-        let (mut f, mut law): (f64, f64) = (0.0, 0.0);
-        let mut slowest = (0.0, 0u64, String::new());
+        let mut row = Row::new(&family);
         for (name, case) in (family.cases)() {
-            let c2 = Instant::now();
-            let o = case();
-            let t = c2.elapsed().as_secs_f64();
-            if t > slowest.0 { slowest = (t, o.steps, name.clone()); }
-            let e = ends.entry(o.end).or_default();
-            e.0 += 1;
-            e.1 = e.1.max(o.steps);
-            if let (Some(c), "converged") = (o.check, o.end) {
-                f = f.max(c.f_max);
-                law = law.max(c.law);
+            let outcome = case();
+            if let Some(wrong) = &outcome.wrong {
+                println!("WRONG: {}, {name}: {wrong}", family.name);
             }
-            if let Some(w) = &o.wrong {
-                println!("   WRONG {name}: {} after {} steps: {w}", o.end, o.steps);
-            } else if o.end != "converged" {
-                println!("   {name}: {} after {} steps: {}", o.end, o.steps, o.message);
+            row.count(name, outcome);
+        }
+        row.seconds = clock.elapsed().as_secs_f64();
+        eprintln!("  {}", row.line());
+        rows.push(row);
+    }
+    let text = report::markdown(&rows);
+    match file {
+        None => println!("{text}"),
+        Some(path) => {
+            if let Err(error) = std::fs::write(&path, text) {
+                eprintln!("cannot write {path}: {error}");
+                return ExitCode::FAILURE;
             }
         }
-        println!("{}: {ends:?} f_max {f:.1e} law {law:.1e} {:.1} s; slowest {slowest:?}", family.name, clock.elapsed().as_secs_f64());
+    }
+    if rows.iter().all(Row::good) {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     }
 }

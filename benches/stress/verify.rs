@@ -32,6 +32,10 @@ pub struct Check {
     pub least_force: f64,
     /// How deep the deepest overlap with a *second* image is, in units of the larger radius; 0 if there is none.
     pub second_image: f64,
+    /// A bound of the widest bulge, in units of the largest radius.
+    pub bulge: f64,
+    /// The largest squeeze Σ f/2πγ of a particle.
+    pub squeeze: f64,
     /// Pressure `(1/2V) Σ f r` (γ/length).
     pub pressure: f64,
     /// Whether all numbers are finite.
@@ -114,7 +118,7 @@ impl Answer<'_> {
         let f_max = net
             .iter()
             .map(|f| f[0].hypot(f[1]))
-            .fold(0.0, |m: f64, f| greater(m, f));
+            .fold(0.0, greater);
         let finite = self.centres.iter().flatten().all(|x| x.is_finite())
             && self.forces.iter().all(|f| f.is_finite())
             && f_max.is_finite()
@@ -126,6 +130,12 @@ impl Answer<'_> {
             round_off: 8.0 * f64::EPSILON * self.sides[0].max(self.sides[1]),
             least_force: contacts.iter().map(|c| c.3).fold(f64::INFINITY, f64::min),
             second_image: second,
+            bulge: (0..n).map(|p| reach[p] - self.radii[p]).fold(0.0, greater)
+                / self.radii.iter().copied().fold(0.0, f64::max),
+            squeeze: around
+                .iter()
+                .map(|a| a.iter().map(|c| c.1).sum::<f64>() / (2.0 * PI))
+                .fold(0.0, greater),
             pressure: contacts.iter().map(|c| c.3 * c.2[0].hypot(c.2[1])).sum::<f64>()
                 / (2.0 * self.sides[0] * self.sides[1]),
             finite,

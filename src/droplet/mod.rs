@@ -6,3 +6,4 @@
 
 pub mod contour;
 pub mod kernel;
+pub mod validity;
