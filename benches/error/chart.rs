@@ -83,7 +83,11 @@ impl Axis {
         let (first, last) = (a.log10().floor() as i32, b.log10().ceil() as i32);
         let every = ((last - first) / 6 + 1).max(1);
         // Where there are few decades, 2 and 5 help.
-        let within: &[f64] = if b / a < 150.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let within: &[f64] = if b / a < 150.0 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
         (first..=last)
             .filter(|k| (k - first) % every == 0)
             .flat_map(|k| within.iter().map(move |m| (k, *m)))
@@ -110,7 +114,11 @@ fn power(k: i32, m: f64) -> String {
             other => char::from_u32(0x2070 + other as u32 - '0' as u32).unwrap_or(other),
         })
         .collect();
-    if m == 1.0 { format!("10{digits}") } else { format!("{m} · 10{digits}") }
+    if m == 1.0 {
+        format!("10{digits}")
+    } else {
+        format!("{m} · 10{digits}")
+    }
 }
 
 /// A panel with axes.
@@ -130,7 +138,12 @@ impl Panel {
     pub fn svg(&self) -> String {
         let (left, top, width, height) = AREA;
         let mut s = title(&self.title);
-        let at = |x: f64, y: f64| (left + width * self.x.place(x), top + height * (1.0 - self.y.place(y)));
+        let at = |x: f64, y: f64| {
+            (
+                left + width * self.x.place(x),
+                top + height * (1.0 - self.y.place(y)),
+            )
+        };
         for (value, label) in self.x.ticks() {
             let x = at(value, self.y.range.0).0;
             line(&mut s, (x, top), (x, top + height), GRID);
@@ -147,7 +160,13 @@ impl Panel {
             within(&self.x, x) && within(&self.y, y)
         };
         for series in &self.series {
-            let points: Vec<(f64, f64)> = series.points.iter().copied().filter(|p| inside(*p)).map(|p| at(p.0, p.1)).collect();
+            let points: Vec<(f64, f64)> = series
+                .points
+                .iter()
+                .copied()
+                .filter(|p| inside(*p))
+                .map(|p| at(p.0, p.1))
+                .collect();
             stroke(&mut s, &points, series);
             for p in &points {
                 mark(&mut s, *p, series);
@@ -187,7 +206,12 @@ impl Bars {
         let pitch = height / self.bars.len().max(1) as f64;
         let (mut tick, every) = (0.0, if self.most > 4.0 { 2.0 } else { 0.5 });
         while tick <= self.most {
-            text(&mut s, (x(tick), top + height + 19.0), "middle", &format!("{tick:.1}"));
+            text(
+                &mut s,
+                (x(tick), top + height + 19.0),
+                "middle",
+                &format!("{tick:.1}"),
+            );
             line(&mut s, (x(tick), top), (x(tick), top + height), GRID);
             tick += every;
         }
@@ -218,7 +242,9 @@ impl Bars {
 }
 
 fn title(title: &str) -> String {
-    format!("<text x=\"10\" y=\"24\" font-size=\"17\" font-weight=\"bold\" fill=\"{INK}\">{title}</text>\n")
+    format!(
+        "<text x=\"10\" y=\"24\" font-size=\"17\" font-weight=\"bold\" fill=\"{INK}\">{title}</text>\n"
+    )
 }
 
 fn frame(s: &mut String, x_label: &str, y_label: Option<&str>) {
@@ -227,7 +253,12 @@ fn frame(s: &mut String, x_label: &str, y_label: Option<&str>) {
         s,
         "<rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.2\"/>"
     );
-    text(s, (left + 0.5 * width, top + height + 43.0), "middle", x_label);
+    text(
+        s,
+        (left + 0.5 * width, top + height + 43.0),
+        "middle",
+        x_label,
+    );
     if let Some(label) = y_label {
         let _ = writeln!(
             s,
@@ -256,8 +287,15 @@ fn stroke(s: &mut String, points: &[(f64, f64)], series: &Series) {
     if series.line == Line::None || points.len() < 2 {
         return;
     }
-    let path: Vec<String> = points.iter().map(|p| format!("{:.1},{:.1}", p.0, p.1)).collect();
-    let dash = if series.line == Line::Dashed { " stroke-dasharray=\"6 4\"" } else { "" };
+    let path: Vec<String> = points
+        .iter()
+        .map(|p| format!("{:.1},{:.1}", p.0, p.1))
+        .collect();
+    let dash = if series.line == Line::Dashed {
+        " stroke-dasharray=\"6 4\""
+    } else {
+        ""
+    };
     let _ = writeln!(
         s,
         "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\" stroke-linejoin=\"round\"{dash}/>",
@@ -270,7 +308,10 @@ fn mark(s: &mut String, (x, y): (f64, f64), series: &Series) {
     let color = series.color;
     let _ = match series.marker {
         Marker::None => Ok(()),
-        Marker::Circle => writeln!(s, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{color}\"/>"),
+        Marker::Circle => writeln!(
+            s,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{color}\"/>"
+        ),
         Marker::Open => writeln!(
             s,
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"white\" stroke=\"{color}\" stroke-width=\"1.8\"/>"

@@ -15,7 +15,14 @@ use std::time::Instant;
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "particles", "phi", "method", "tolerance", "residual", "seconds", "iterations", "contacts",
+        "particles",
+        "phi",
+        "method",
+        "tolerance",
+        "residual",
+        "seconds",
+        "iterations",
+        "contacts",
     ]);
     let mut samples: Vec<(usize, f64)> = vec![(64, 0.86), (256, 0.86)];
     if !quick {
@@ -31,18 +38,19 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
 fn sample(table: &mut Table, particles: usize, phi: f64) -> Result<(), Box<dyn Error>> {
     let count = (200_000 / particles).clamp(5, 60);
     let frames = frames(particles, phi, count)?;
-    let mut row = |method: &str, tolerance: f64, seconds: f64, law: &ContactLaw, iterations: f64| {
-        table.push(vec![
-            particles.to_string(),
-            phi.to_string(),
-            method.into(),
-            format!("{tolerance:e}"),
-            digits(law.residual()),
-            digits(seconds),
-            format!("{iterations:.1}"),
-            law.contacts().pairs.len().to_string(),
-        ]);
-    };
+    let mut row =
+        |method: &str, tolerance: f64, seconds: f64, law: &ContactLaw, iterations: f64| {
+            table.push(vec![
+                particles.to_string(),
+                phi.to_string(),
+                method.into(),
+                format!("{tolerance:e}"),
+                digits(law.residual()),
+                digits(seconds),
+                format!("{iterations:.1}"),
+                law.contacts().pairs.len().to_string(),
+            ]);
+        };
     let mut decades: Vec<f64> = (1..=13).map(|k| 10f64.powi(-k)).collect();
     if particles > 1024 {
         decades = vec![1e-4, 1e-7, 1e-10, 1e-13];
@@ -70,8 +78,20 @@ fn sample(table: &mut Table, particles: usize, phi: f64) -> Result<(), Box<dyn E
         }
         let per = |iterations: u64| iterations as f64 / f64::from(warm_solves);
         let warm_iterations = per(warm.work().iterations - before_warm.iterations);
-        row("warm CG", tolerance, median(warm_times), &warm, warm_iterations);
-        row("cold CG", tolerance, median(cold_times), &cold, per(cold_iterations));
+        row(
+            "warm CG",
+            tolerance,
+            median(warm_times),
+            &warm,
+            warm_iterations,
+        );
+        row(
+            "cold CG",
+            tolerance,
+            median(cold_times),
+            &cold,
+            per(cold_iterations),
+        );
     }
     // The direct methods know one residual: round-off.
     let mut cholesky = law(Method::SparseCholesky, 1e-13);
@@ -95,7 +115,10 @@ fn sample(table: &mut Table, particles: usize, phi: f64) -> Result<(), Box<dyn E
     row("assembly and search", 1e-10, median(nothing), &done, 0.0);
     if particles <= 1024 {
         let mut dense = law(Method::GaussJordan, 1e-13);
-        let (pairs, forces) = (cholesky.contacts().pairs.to_vec(), cholesky.contacts().forces.to_vec());
+        let (pairs, forces) = (
+            cholesky.contacts().pairs.to_vec(),
+            cholesky.contacts().forces.to_vec(),
+        );
         let mut times = Vec::new();
         let last = &frames[frames.len() - 1];
         for _ in 0..(if particles > 256 { 1 } else { 3 }) {

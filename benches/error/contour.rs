@@ -14,7 +14,13 @@ use std::time::Instant;
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "placement", "vertices", "vertices_per_particle", "largest_error", "rms_error", "area_error", "ns_per_particle",
+        "placement",
+        "vertices",
+        "vertices_per_particle",
+        "largest_error",
+        "rms_error",
+        "area_error",
+        "ns_per_particle",
     ]);
     let scene = Scene {
         particles: if quick { 64 } else { 256 },
@@ -26,12 +32,20 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     while run.status() == Status::Running {
         run.advance()?;
     }
-    for (name, placement) in [("equal angles", Placement::Equal), ("and on contacts", Placement::Contacts)] {
+    for (name, placement) in [
+        ("equal angles", Placement::Equal),
+        ("and on contacts", Placement::Contacts),
+    ] {
         for exponent in 3..=(if quick { 6 } else { 11 }) {
-            style(&mut table, &run, name, ContourStyle {
-                vertices: 1 << exponent,
-                placement,
-            });
+            style(
+                &mut table,
+                &run,
+                name,
+                ContourStyle {
+                    vertices: 1 << exponent,
+                    placement,
+                },
+            );
         }
     }
     Ok(table)
@@ -44,24 +58,43 @@ fn style(table: &mut Table, run: &Relaxation, name: &str, style: ContourStyle) {
     contours.draw(packing.radii(), packing.positions(), &contacts, 1.0);
     let seconds = clock.elapsed().as_secs_f64();
     let mut around: Vec<Vec<(f64, f64)>> = vec![Vec::new(); packing.len()];
-    for ((&[i, j], n), &f) in contacts.pairs.iter().zip(contacts.normals).zip(contacts.forces) {
+    for ((&[i, j], n), &f) in contacts
+        .pairs
+        .iter()
+        .zip(contacts.normals)
+        .zip(contacts.forces)
+    {
         around[i as usize].push(((-n.y).atan2(-n.x), f));
         around[j as usize].push((n.y.atan2(n.x), f));
     }
-    let (mut largest, mut squares, mut samples, mut area): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
+    let (mut largest, mut squares, mut samples, mut area): (f64, f64, f64, f64) =
+        (0.0, 0.0, 0.0, 0.0);
     for (p, pushed) in around.iter().enumerate() {
         let radius = packing.radii()[p];
-        let rho = |angle: f64| 1.0 + pushed.iter().map(|(t, f)| f * g(angle - t)).sum::<f64>() / (2.0 * PI);
+        let rho = |angle: f64| {
+            1.0 + pushed.iter().map(|(t, f)| f * g(angle - t)).sum::<f64>() / (2.0 * PI)
+        };
         let centre = packing.positions()[p];
-        let vertices: Vec<_> = contours.polygon(p).iter().map(|v| (v - centre) / radius).collect();
+        let vertices: Vec<_> = contours
+            .polygon(p)
+            .iter()
+            .map(|v| (v - centre) / radius)
+            .collect();
         let mut polygon_area = 0.0;
         for (k, a) in vertices.iter().enumerate() {
             let b = vertices[(k + 1) % vertices.len()];
             polygon_area += 0.5 * a.perp(&b);
             let from = a.y.atan2(a.x);
             let width = (b.y.atan2(b.x) - from).rem_euclid(2.0 * PI);
-            let mut angles: Vec<f64> = (1..=8).map(|s| from + width * (f64::from(s) - 0.5) / 8.0).collect();
-            angles.extend(pushed.iter().map(|c| c.0).filter(|t| (t - from).rem_euclid(2.0 * PI) < width));
+            let mut angles: Vec<f64> = (1..=8)
+                .map(|s| from + width * (f64::from(s) - 0.5) / 8.0)
+                .collect();
+            angles.extend(
+                pushed
+                    .iter()
+                    .map(|c| c.0)
+                    .filter(|t| (t - from).rem_euclid(2.0 * PI) < width),
+            );
             for angle in angles {
                 // The chord from a to b, met by the ray at this angle.
                 let ray = softjam::domain::Vec2::new(angle.cos(), angle.sin());

@@ -1,6 +1,8 @@
 //! The figure: six panels from the six tables.
 
-use super::chart::{Axis, BLACK, BLUE, Bars, GREEN, Line, Marker, ORANGE, PINK, Panel, RED, SIZE, SKY, Series};
+use super::chart::{
+    Axis, BLACK, BLUE, Bars, GREEN, Line, Marker, ORANGE, PINK, Panel, RED, SIZE, SKY, Series,
+};
 use super::table::Table;
 use std::fmt::Write as _;
 
@@ -29,7 +31,13 @@ pub fn draw(tables: &[Table]) -> String {
     s
 }
 
-fn series(label: &str, points: Vec<(f64, f64)>, color: &'static str, marker: Marker, line: Line) -> Series {
+fn series(
+    label: &str,
+    points: Vec<(f64, f64)>,
+    color: &'static str,
+    marker: Marker,
+    line: Line,
+) -> Series {
     Series {
         label: label.into(),
         points,
@@ -55,7 +63,11 @@ fn decades<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
 
 fn contact(table: &Table) -> String {
     let sizes = table.values("particles");
-    let n = if sizes.iter().any(|s| s == "1024") { "1024" } else { "256" };
+    let n = if sizes.iter().any(|s| s == "1024") {
+        "1024"
+    } else {
+        "256"
+    };
     let of = |method: &str| {
         let filter = [("particles", n), ("phi", "0.86"), ("method", method)];
         let mut points = table.points(&filter, "seconds", "residual");
@@ -68,12 +80,27 @@ fn contact(table: &Table) -> String {
     let series = vec![
         series("warm CG", of("warm CG"), BLUE, Marker::Circle, Line::Solid),
         series("cold CG", of("cold CG"), SKY, Marker::Square, Line::Solid),
-        series("sparse Cholesky", of("sparse Cholesky"), GREEN, Marker::Triangle, Line::None),
-        series("dense Gauss–Jordan", of("dense Gauss–Jordan"), RED, Marker::Diamond, Line::None),
+        series(
+            "sparse Cholesky",
+            of("sparse Cholesky"),
+            GREEN,
+            Marker::Triangle,
+            Line::None,
+        ),
+        series(
+            "dense Gauss–Jordan",
+            of("dense Gauss–Jordan"),
+            RED,
+            Marker::Diamond,
+            Line::None,
+        ),
     ];
     Panel {
         title: format!("a  Contact problem, N = {n}, φ = 0.86"),
-        x: Axis::log("time of one solution (ms)", decades(series.iter().flat_map(|s| &s.points).map(|p| &p.0))),
+        x: Axis::log(
+            "time of one solution (ms)",
+            decades(series.iter().flat_map(|s| &s.points).map(|p| &p.0)),
+        ),
         y: Axis::log("residual / largest overlap", (1e-16, 1.0)),
         legend: (0.40, 0.10),
         notes: Vec::new(),
@@ -84,7 +111,11 @@ fn contact(table: &Table) -> String {
 
 fn relaxation(table: &Table) -> String {
     let sizes = table.values("particles");
-    let n = if sizes.iter().any(|s| s == "1024") { "1024" } else { "64" };
+    let n = if sizes.iter().any(|s| s == "1024") {
+        "1024"
+    } else {
+        "64"
+    };
     let phi = if n == "64" { "0.9" } else { "0.86" };
     let of = |variant: &str| {
         let filter = [("particles", n), ("phi", phi), ("variant", variant)];
@@ -94,7 +125,12 @@ fn relaxation(table: &Table) -> String {
         ("fire", BLUE, Marker::Circle, Line::Solid),
         ("fire + newton", RED, Marker::Diamond, Line::Solid),
         ("fire, gradient form", SKY, Marker::Open, Line::Solid),
-        ("fire + newton, gradient form", ORANGE, Marker::Triangle, Line::Solid),
+        (
+            "fire + newton, gradient form",
+            ORANGE,
+            Marker::Triangle,
+            Line::Solid,
+        ),
         ("fire, dt_max / 2", PINK, Marker::None, Line::Dashed),
         ("fire, dt_max × 1.4", GREEN, Marker::None, Line::Dashed),
         ("fire, dt_max × 2", BLACK, Marker::None, Line::Dashed),
@@ -127,12 +163,36 @@ fn model(table: &Table) -> String {
         }
     }
     let series = vec![
-        series("two plates", of("two plates"), GREEN, Marker::None, Line::Dashed),
+        series(
+            "two plates",
+            of("two plates"),
+            GREEN,
+            Marker::None,
+            Line::Dashed,
+        ),
         series("square", of("square"), ORANGE, Marker::None, Line::Solid),
         series("hexagon", of("hexagon"), RED, Marker::None, Line::Dashed),
-        series("hexagonal crystal, softjam", of("hexagonal crystal"), BLUE, Marker::Open, Line::None),
-        series("packings, mean squeeze", packings, BLACK, Marker::Square, Line::None),
-        series("", vec![(1e-3, 0.1), (1.0, 0.1)], PINK, Marker::None, Line::Dashed),
+        series(
+            "hexagonal crystal, softjam",
+            of("hexagonal crystal"),
+            BLUE,
+            Marker::Open,
+            Line::None,
+        ),
+        series(
+            "packings, mean squeeze",
+            packings,
+            BLACK,
+            Marker::Square,
+            Line::None,
+        ),
+        series(
+            "",
+            vec![(1e-3, 0.1), (1.0, 0.1)],
+            PINK,
+            Marker::None,
+            Line::Dashed,
+        ),
     ];
     notes.push((1.9e-3, 0.112, "10 %".into()));
     Panel {
@@ -155,9 +215,27 @@ fn size(table: &Table) -> String {
         points
     };
     let series = vec![
-        series("droplets, φ = 0.86", of("0.86", "ns_per_step_and_particle"), BLUE, Marker::Circle, Line::Solid),
-        series("droplets, φ = 0.95", of("0.95", "ns_per_step_and_particle"), RED, Marker::Diamond, Line::Solid),
-        series("disks, φ = 0.86", of("0.86", "disks_ns_per_step_and_particle"), SKY, Marker::Square, Line::Solid),
+        series(
+            "droplets, φ = 0.86",
+            of("0.86", "ns_per_step_and_particle"),
+            BLUE,
+            Marker::Circle,
+            Line::Solid,
+        ),
+        series(
+            "droplets, φ = 0.95",
+            of("0.95", "ns_per_step_and_particle"),
+            RED,
+            Marker::Diamond,
+            Line::Solid,
+        ),
+        series(
+            "disks, φ = 0.86",
+            of("0.86", "disks_ns_per_step_and_particle"),
+            SKY,
+            Marker::Square,
+            Line::Solid,
+        ),
     ];
     let y = decades(series.iter().flat_map(|s| &s.points).map(|p| &p.1));
     Panel {
@@ -186,14 +264,24 @@ fn recording(table: &Table) -> String {
         let slow = table.points(&filter, "slowdown", "bytes_per_step");
         let rate = table.points(&filter, "steps_per_s", "bytes_per_step");
         let (&(slow, bytes), &(rate, _)) = (slow.first()?, rate.first()?);
-        Some((name.into(), slow, format!("{rate:.0} steps/s, {:.1} kB/step", bytes / 1e3)))
+        Some((
+            name.into(),
+            slow,
+            format!("{rate:.0} steps/s, {:.1} kB/step", bytes / 1e3),
+        ))
     })
     .collect();
-    let n = table.values("particles").first().cloned().unwrap_or_default();
+    let n = table
+        .values("particles")
+        .first()
+        .cloned()
+        .unwrap_or_default();
     Bars {
         title: format!("e  Recording every step, N = {n}"),
         label: "time of a step / without recording".into(),
-        most: bars.iter().fold(1.5, |m: f64, b| m.max((2.0 * b.1).ceil() / 2.0)),
+        most: bars
+            .iter()
+            .fold(1.5, |m: f64, b| m.max((2.0 * b.1).ceil() / 2.0)),
         limit: None,
         bars,
     }
@@ -201,12 +289,38 @@ fn recording(table: &Table) -> String {
 }
 
 fn contour(table: &Table) -> String {
-    let of = |placement: &str, column: &str| table.points(&[("placement", placement)], "vertices_per_particle", column);
+    let of = |placement: &str, column: &str| {
+        table.points(&[("placement", placement)], "vertices_per_particle", column)
+    };
     let series = vec![
-        series("equal angles, largest", of("equal angles", "largest_error"), RED, Marker::Diamond, Line::Solid),
-        series("equal angles, rms", of("equal angles", "rms_error"), ORANGE, Marker::None, Line::Dashed),
-        series("and on contacts, largest", of("and on contacts", "largest_error"), BLUE, Marker::Circle, Line::Solid),
-        series("and on contacts, rms", of("and on contacts", "rms_error"), SKY, Marker::None, Line::Dashed),
+        series(
+            "equal angles, largest",
+            of("equal angles", "largest_error"),
+            RED,
+            Marker::Diamond,
+            Line::Solid,
+        ),
+        series(
+            "equal angles, rms",
+            of("equal angles", "rms_error"),
+            ORANGE,
+            Marker::None,
+            Line::Dashed,
+        ),
+        series(
+            "and on contacts, largest",
+            of("and on contacts", "largest_error"),
+            BLUE,
+            Marker::Circle,
+            Line::Solid,
+        ),
+        series(
+            "and on contacts, rms",
+            of("and on contacts", "rms_error"),
+            SKY,
+            Marker::None,
+            Line::Dashed,
+        ),
     ];
     let y = decades(series.iter().flat_map(|s| &s.points).map(|p| &p.1));
     Panel {

@@ -57,7 +57,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             // What `cargo bench` passes on to every bench.
             "--bench" => {}
             "--quick" => quick = true,
-            "--out" => out = arguments.next().map(PathBuf::from).ok_or("--out needs a folder")?,
+            "--out" => {
+                out = arguments
+                    .next()
+                    .map(PathBuf::from)
+                    .ok_or("--out needs a folder")?
+            }
             name if name == "figure" || ITEMS.iter().any(|i| i.0 == name) => items.push(argument),
             other => return Err(format!("no item is called {other}").into()),
         }
@@ -84,7 +89,11 @@ fn draw(folder: &Path) -> Result<(), Box<dyn Error>> {
     for (name, _) in ITEMS {
         let path = folder.join(format!("{name}.csv"));
         // The figure is drawn of what there is.
-        tables.push(if path.exists() { Table::read(&path)? } else { Table::default() });
+        tables.push(if path.exists() {
+            Table::read(&path)?
+        } else {
+            Table::default()
+        });
     }
     let path = folder.join("run-time-against-error.svg");
     std::fs::write(&path, figure::draw(&tables))?;

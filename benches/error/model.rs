@@ -14,14 +14,29 @@ use std::f64::consts::PI;
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "geometry", "phi", "squeeze", "force_exact", "force_model", "model_error", "numerical_error",
+        "geometry",
+        "phi",
+        "squeeze",
+        "force_exact",
+        "force_model",
+        "model_error",
+        "numerical_error",
     ]);
-    for (name, walls) in [("two plates", 2u32), ("triangle", 3), ("square", 4), ("hexagon", 6)] {
+    for (name, walls) in [
+        ("two plates", 2u32),
+        ("triangle", 3),
+        ("square", 4),
+        ("hexagon", 6),
+    ] {
         for k in 0..=(if quick { 6 } else { 30 }) {
             let squeeze = 10f64.powf(-3.0 + 2.6 * f64::from(k) / if quick { 6.0 } else { 30.0 });
             // The model: dent = (f/2π) Σ −g, and Σ f = 2π s.
             let force = 2.0 * PI * squeeze / f64::from(walls);
-            let dent = -(0..walls).map(|k| g(2.0 * PI * f64::from(k) / f64::from(walls))).sum::<f64>() * force / (2.0 * PI);
+            let dent = -(0..walls)
+                .map(|k| g(2.0 * PI * f64::from(k) / f64::from(walls)))
+                .sum::<f64>()
+                * force
+                / (2.0 * PI);
             if let Some(exact) = exact_force(walls, 1.0 - dent) {
                 table.push(vec![
                     name.into(),
@@ -88,7 +103,9 @@ fn crystal(table: &mut Table, phi: f64) -> Result<(), Box<dyn Error>> {
     let inradius = (PI / (12f64.sqrt() * phi)).sqrt();
     let closed = 2.0 * PI * (1.0 - inradius) / (6.0 - PI * 3f64.sqrt());
     let forces = run.contacts().forces;
-    let worst = forces.iter().fold(0.0, |m: f64, f| m.max((f / closed - 1.0).abs()));
+    let worst = forces
+        .iter()
+        .fold(0.0, |m: f64, f| m.max((f / closed - 1.0).abs()));
     let exact = exact_force(6, inradius).ok_or("no droplet fits")?;
     table.push(vec![
         "hexagonal crystal".into(),

@@ -26,11 +26,20 @@ const CHANNELS: [&str; 9] = [
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "particles", "channels", "steps", "steps_per_s", "slowdown", "bytes_per_step",
+        "particles",
+        "channels",
+        "steps",
+        "steps_per_s",
+        "slowdown",
+        "bytes_per_step",
     ]);
-    let program = std::env::var_os("SOFTJAM").map_or_else(|| PathBuf::from("target/release/softjam"), PathBuf::from);
+    let program = std::env::var_os("SOFTJAM")
+        .map_or_else(|| PathBuf::from("target/release/softjam"), PathBuf::from);
     if !program.exists() {
-        eprintln!("  left out: there is no {}; build it with `cargo build --release`", program.display());
+        eprintln!(
+            "  left out: there is no {}; build it with `cargo build --release`",
+            program.display()
+        );
         return Ok(table);
     }
     let (particles, steps, rounds) = if quick { (64, 50, 1) } else { (1024, 1000, 5) };
@@ -85,12 +94,25 @@ fn without(particles: usize, steps: u64) -> Result<f64, Box<dyn Error>> {
 }
 
 /// Steps a second as the program reports them, and the bytes of the file.
-fn with(program: &Path, particles: usize, steps: u64, channels: &str) -> Result<(f64, f64), Box<dyn Error>> {
+fn with(
+    program: &Path,
+    particles: usize,
+    steps: u64,
+    channels: &str,
+) -> Result<(f64, f64), Box<dyn Error>> {
     let file = std::env::temp_dir().join(format!("softjam-benchmark-{}.rrd", std::process::id()));
-    let every: Vec<String> = channels.split(',').map(|c| format!("{c}=every:1")).collect();
+    let every: Vec<String> = channels
+        .split(',')
+        .map(|c| format!("{c}=every:1"))
+        .collect();
     let output = Command::new(program)
         .args(["record", "--force", "--threshold", "1e-300"])
-        .args(["--particles", &particles.to_string(), "--steps", &steps.to_string()])
+        .args([
+            "--particles",
+            &particles.to_string(),
+            "--steps",
+            &steps.to_string(),
+        ])
         .args(["--channels", &every.join(",")])
         .arg("--output")
         .arg(&file)

@@ -14,7 +14,11 @@ const VARIANTS: [(&str, &str, f64); 7] = [
     ("fire", "", 1.0),
     ("fire + newton", "minimizer = \"fire+newton\"", 1.0),
     ("fire, gradient form", "forces = \"gradient\"", 1.0),
-    ("fire + newton, gradient form", "minimizer = \"fire+newton\"\nforces = \"gradient\"", 1.0),
+    (
+        "fire + newton, gradient form",
+        "minimizer = \"fire+newton\"\nforces = \"gradient\"",
+        1.0,
+    ),
     ("fire, dt_max / 2", "", 0.5),
     ("fire, dt_max × 1.4", "", 1.4),
     ("fire, dt_max × 2", "", 2.0),
@@ -22,7 +26,15 @@ const VARIANTS: [(&str, &str, f64); 7] = [
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "particles", "phi", "variant", "f_max", "seconds", "disks_seconds", "steps", "seeds", "steps_per_s",
+        "particles",
+        "phi",
+        "variant",
+        "f_max",
+        "seconds",
+        "disks_seconds",
+        "steps",
+        "seeds",
+        "steps_per_s",
     ]);
     let samples: Vec<(usize, f64, u64)> = if quick {
         vec![(64, 0.90, 1)]
@@ -95,7 +107,8 @@ fn variant(
     for (decade, list) in reached.iter().enumerate() {
         // A median over the seeds, where most have come so far.
         if 2 * list.len() > seeds as usize {
-            let middle = |pick: fn(&(f64, f64, f64)) -> f64| median(list.iter().map(pick).collect());
+            let middle =
+                |pick: fn(&(f64, f64, f64)) -> f64| median(list.iter().map(pick).collect());
             table.push(vec![
                 particles.to_string(),
                 phi.to_string(),

@@ -12,7 +12,12 @@ use std::time::Instant;
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
-        "particles", "phi", "ns_per_step_and_particle", "iterations_per_step", "sweeps_per_step", "disks_ns_per_step_and_particle",
+        "particles",
+        "phi",
+        "ns_per_step_and_particle",
+        "iterations_per_step",
+        "sweeps_per_step",
+        "disks_ns_per_step_and_particle",
     ]);
     let sizes: &[usize] = if quick {
         &[64, 256]
@@ -32,7 +37,8 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
             let mut packing = start::packing(&scene)?;
             let clock = Instant::now();
             let report = disks::relax(&mut packing, &scene.disks, scene.line_tension);
-            let disks = clock.elapsed().as_secs_f64() / (report.steps.max(1) as f64 * particles as f64);
+            let disks =
+                clock.elapsed().as_secs_f64() / (report.steps.max(1) as f64 * particles as f64);
             let mut run = Relaxation::of_packing(&scene, packing)?;
             for _ in 0..20 {
                 run.advance()?;
@@ -58,7 +64,10 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
                 run.packing().len().to_string(),
                 phi.to_string(),
                 digits(1e9 * median(times) / n),
-                format!("{:.2}", (work.iterations - before.iterations) as f64 / steps),
+                format!(
+                    "{:.2}",
+                    (work.iterations - before.iterations) as f64 / steps
+                ),
                 format!("{:.3}", (work.sweeps - before.sweeps) as f64 / steps),
                 digits(1e9 * disks),
             ]);

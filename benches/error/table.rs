@@ -44,7 +44,9 @@ impl Table {
 
     pub fn read(path: &Path) -> Result<Self, Box<dyn Error>> {
         let text = std::fs::read_to_string(path)?;
-        let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect());
+        let mut lines = text
+            .lines()
+            .map(|l| l.split(',').map(str::to_owned).collect());
         Ok(Self {
             columns: lines.next().unwrap_or_default(),
             rows: lines.collect(),

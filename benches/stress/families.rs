@@ -27,7 +27,11 @@ pub fn all() -> Vec<Family> {
             "1000 random packings, N = 64, φ uniform in 0.5–1.1, size ratio log-uniform in 1–10, half of them 50:50 mixtures, half continuous spreads",
             random,
         ),
-        family("few", "N = 1, 2, 3, 5 from random starts, φ = 0.05–1.2, 20 seeds each", few),
+        family(
+            "few",
+            "N = 1, 2, 3, 5 from random starts, φ = 0.05–1.2, 20 seeds each",
+            few,
+        ),
         family(
             "tight box",
             "N = 1, 2, 3, 5 of radius 1/2 at random in square boxes of side 1–3 (2–6 radii)",
@@ -63,13 +67,21 @@ pub fn all() -> Vec<Family> {
             "the same with dt_max = 0.04, about a third of the default",
             || dense(Some(0.04)),
         ),
-        family("large", "N = 100 000, φ = 0.86: 300 steps of the disks, then 100 steps", large),
+        family(
+            "large",
+            "N = 100 000, φ = 0.86: 300 steps of the disks, then 100 steps",
+            large,
+        ),
         family(
             "jamming",
             "φ within 1e-4 of where a sample jams, found by bisection, on both sides of it: N = 64, 6 seeds; N = 256, 2 seeds",
             jamming,
         ),
-        family("extremes", "every scene field at the ends of its allowed range", extremes),
+        family(
+            "extremes",
+            "every scene field at the ends of its allowed range",
+            extremes,
+        ),
     ]
 }
 
@@ -119,7 +131,10 @@ fn few() -> Vec<Case> {
                     seed,
                     ..Scene::default()
                 };
-                cases.push(case(format!("N = {particles}, φ = {phi}, seed {seed}"), scene));
+                cases.push(case(
+                    format!("N = {particles}, φ = {phi}, seed {seed}"),
+                    scene,
+                ));
             }
         }
     }
@@ -139,7 +154,10 @@ fn dense(dt_max: Option<f64>) -> Vec<Case> {
                     steps: 20_000,
                     ..Scene::default()
                 };
-                cases.push(case(format!("N = {particles}, φ = {phi}, seed {seed}"), scene));
+                cases.push(case(
+                    format!("N = {particles}, φ = {phi}, seed {seed}"),
+                    scene,
+                ));
             }
         }
     }
@@ -157,31 +175,40 @@ fn large() -> Vec<Case> {
 }
 
 fn jamming() -> Vec<Case> {
-    let mut cases: Vec<Case> = Vec::new();
-    for (particles, seeds) in [(64, 1..=6), (256, 1..=2)] {
-        for seed in seeds {
-            let at = move |phi: f64| Scene {
-                particles,
-                phi,
-                seed,
-                ..Scene::default()
-            };
-            // From random starts jammed and unjammed coverages interleave; bisection ends at one of the borders.
-            let (mut loose, mut jammed) = (0.80, 0.88);
-            while jammed - loose > 1e-4 {
-                let middle = 0.5 * (loose + jammed);
-                if pressure_of(&at(middle)) > 1e-6 {
-                    jammed = middle;
-                } else {
-                    loose = middle;
-                }
-            }
-            for phi in [loose, 0.5 * (loose + jammed), jammed] {
-                cases.push(case(format!("N = {particles}, seed {seed}, φ = {phi:.6}"), at(phi)));
-            }
+    (1..=6)
+        .map(|seed| (64, seed))
+        .chain([(256, 1), (256, 2)])
+        .flat_map(|(particles, seed)| jamming_of(particles, seed))
+        .collect()
+}
+
+/// Both sides of where a sample jams, 1e-4 apart at most, and between them.
+pub fn jamming_of(particles: usize, seed: u64) -> Vec<Case> {
+    let at = |phi: f64| Scene {
+        particles,
+        phi,
+        seed,
+        ..Scene::default()
+    };
+    // From random starts jammed and unjammed coverages interleave; bisection ends at one of the borders.
+    let (mut loose, mut jammed) = (0.80, 0.88);
+    while jammed - loose > 1e-4 {
+        let middle = 0.5 * (loose + jammed);
+        if pressure_of(&at(middle)) > 1e-6 {
+            jammed = middle;
+        } else {
+            loose = middle;
         }
     }
-    cases
+    [loose, 0.5 * (loose + jammed), jammed]
+        .into_iter()
+        .map(|phi| {
+            case(
+                format!("N = {particles}, seed {seed}, φ = {phi:.6}"),
+                at(phi),
+            )
+        })
+        .collect()
 }
 
 /// Lines of a scene file over `particles = 64`, `phi = 0.9`.
@@ -189,7 +216,14 @@ fn extremes() -> Vec<Case> {
     const NEVER: &str = "steps = 2000"; // no scene with this line can converge, or only by luck
     let mut lines: Vec<String> = Vec::new();
     for field in ["line_tension", "threshold", "dt_max", "disks.threshold"] {
-        for value in ["5e-324", "1e-100", "1e-99", "1e99", "1e100", "1.7976931348623157e308"] {
+        for value in [
+            "5e-324",
+            "1e-100",
+            "1e-99",
+            "1e99",
+            "1e100",
+            "1.7976931348623157e308",
+        ] {
             lines.push(format!("{field} = {value}\n{NEVER}\ndisks.steps = 2000"));
         }
     }
@@ -232,11 +266,11 @@ fn extremes() -> Vec<Case> {
         "particles = 1",
         "phi = 5e-324",
         "phi = 1e-300",
-        "phi = 1.2999999999999998",
+        "phi = 1.2999999999999998\nsteps = 3000",
         "aspect = 0.1",
         "aspect = 10",
-        "particles = 1024\naspect = 0.1",
-        "particles = 1024\naspect = 10",
+        "particles = 256\naspect = 0.1",
+        "particles = 256\naspect = 10",
         "start = \"hexagonal\"\naspect = 10",
         "species = [{ radius = 1e-6, fraction = 1 }]",
         "species = [{ radius = 1e6, fraction = 1 }]",

@@ -83,7 +83,10 @@ pub fn threshold() -> Vec<Case> {
     for (side, distance) in beside(1.2) {
         // 0.5 + 0.7 is 1.2 to the last bit; the origin keeps the distance exact.
         let two = [(0.0, 3.0, 0.5), (distance, 3.0, 0.7)];
-        cases.push(case(format!("pair {side} contact"), packing([9.0, 9.0], &two)));
+        cases.push(case(
+            format!("pair {side} contact"),
+            packing([9.0, 9.0], &two),
+        ));
         for squeeze in [1.0, 0.9] {
             let chain: Vec<_> = (0..8)
                 .map(|k| {
@@ -99,7 +102,12 @@ pub fn threshold() -> Vec<Case> {
     let pressed = |y: f64| {
         packing(
             [9.0, 9.0],
-            &[(3.0, 3.0, 0.5), (3.9, 3.0, 0.5), (4.8, 3.0, 0.5), (3.9, 3.0 + y, 0.5)],
+            &[
+                (3.0, 3.0, 0.5),
+                (3.9, 3.0, 0.5),
+                (4.8, 3.0, 0.5),
+                (3.9, 3.0 + y, 0.5),
+            ],
         )
     };
     let touches = |y: f64| {
@@ -129,7 +137,10 @@ pub fn threshold() -> Vec<Case> {
     for ulps in -4..=4 {
         let critical = PI / 12f64.sqrt();
         let phi = f64::from_bits(critical.to_bits().wrapping_add_signed(ulps));
-        cases.push(lattice(format!("hexagonal, φ_c {ulps:+} units"), hexagonal(phi, false)));
+        cases.push(lattice(
+            format!("hexagonal, φ_c {ulps:+} units"),
+            hexagonal(phi, false),
+        ));
     }
     cases
 }
@@ -145,17 +156,26 @@ pub fn coincident() -> Vec<Case> {
     };
     for n in 2..=12 {
         let alone = vec![(7.0, 7.0, 0.5); n];
-        push(format!("{n} centres on one point"), &packing([20.0, 20.0], &alone));
+        push(
+            format!("{n} centres on one point"),
+            &packing([20.0, 20.0], &alone),
+        );
         let mut amid = vec![(7.0, 7.0, 0.5); n];
         amid.extend((0..30).map(|_| (random.within(0.0, 9.0), random.within(0.0, 9.0), 0.5)));
-        push(format!("{n} centres on one point amid 30 others"), &packing([9.0, 9.0], &amid));
+        push(
+            format!("{n} centres on one point amid 30 others"),
+            &packing([9.0, 9.0], &amid),
+        );
     }
     for k in 0..10 {
         let mut points: Vec<_> = (0..24)
             .map(|_| (random.within(0.0, 6.0), random.within(0.0, 6.0), 0.5))
             .collect();
         points.extend_from_within(0..12);
-        push(format!("12 coincident pairs among 36, sample {k}"), &packing([6.0, 6.0], &points));
+        push(
+            format!("12 coincident pairs among 36, sample {k}"),
+            &packing([6.0, 6.0], &points),
+        );
     }
     cases
 }
@@ -175,8 +195,15 @@ pub fn lattices() -> Vec<Case> {
             ));
         }
         for mixed in [false, true] {
-            let kind = if mixed { "hexagonal, two sizes" } else { "hexagonal" };
-            cases.push(lattice(format!("{kind}, φ = {phi:.4}"), hexagonal(phi, mixed)));
+            let kind = if mixed {
+                "hexagonal, two sizes"
+            } else {
+                "hexagonal"
+            };
+            cases.push(lattice(
+                format!("{kind}, φ = {phi:.4}"),
+                hexagonal(phi, mixed),
+            ));
         }
     }
     cases

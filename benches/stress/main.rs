@@ -53,7 +53,11 @@ fn main() -> ExitCode {
         let clock = Instant::now();
         let mut row = Row::new(&family);
         for (name, case) in (family.cases)() {
+            let clock = Instant::now();
             let outcome = case();
+            if clock.elapsed().as_secs_f64() > 2.0 {
+                eprintln!("  {name}: {:.1} s", clock.elapsed().as_secs_f64());
+            }
             if let Some(wrong) = &outcome.wrong {
                 println!("WRONG: {}, {name}: {wrong}", family.name);
             }

@@ -113,8 +113,17 @@ fn ended(scene: &Scene, run: &Relaxation, status: Status) -> Outcome {
         }
     };
     ask(c.finite, "not finite".into());
-    ask(c.law <= law, format!("the law is broken by {:.1e} at overlaps of {:.1e}", c.law, c.overlap));
-    ask(c.least_force > 0.0, format!("a force of {:.1e}", c.least_force));
+    ask(
+        c.law <= law,
+        format!(
+            "the law is broken by {:.1e} at overlaps of {:.1e}",
+            c.law, c.overlap
+        ),
+    );
+    ask(
+        c.least_force > 0.0,
+        format!("a force of {:.1e}", c.least_force),
+    );
     ask(
         c.second_image <= 1e-9,
         format!("a second image overlaps by {:.1e}", c.second_image),
@@ -157,7 +166,10 @@ fn refused(scene: &Scene, error: &SceneError) -> Outcome {
             length_y,
             largest_radius,
             ..
-        } => ("scene: box too small", length_x.min(*length_y) < 5.0 * largest_radius),
+        } => (
+            "scene: box too small",
+            length_x.min(*length_y) < 5.0 * largest_radius,
+        ),
         SceneError::Range { .. } => (
             "scene: out of range",
             // A coverage so low that the box has no finite area shows only when the radii are there.
@@ -180,15 +192,11 @@ fn failed(error: &RelaxError, packing: &Packing, steps: u64, check: Option<Check
     let (end, right) = match error {
         RelaxError::Contact { source, .. } => match source {
             // A second image does overlap.
-            ContactError::BoxTooSmall { .. } => (
-                "box too small",
-                check.is_some_and(|c| c.second_image > 0.0),
-            ),
+            ContactError::BoxTooSmall { .. } => {
+                ("box too small", check.is_some_and(|c| c.second_image > 0.0))
+            }
             // The forces found fulfil the law, and bound a bulge of more than five of the largest radii.
-            ContactError::Absurd { .. } => (
-                "absurd forces",
-                check.is_some_and(|c| c.bulge > 5.0),
-            ),
+            ContactError::Absurd { .. } => ("absurd forces", check.is_some_and(|c| c.bulge > 5.0)),
             // These say that A is singular or that exchanges cycle: never right where contacts have directions of their own.
             ContactError::Solver(SolverError::NotPositiveDefinite { .. }) => {
                 ("not positive definite", false)

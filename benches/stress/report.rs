@@ -61,8 +61,13 @@ impl Row {
             self.converged += 1;
         } else {
             let first = match outcome.check {
-                _ if !outcome.message.is_empty() => format!("{name}: \"{}\"", shortened(&outcome.message)),
-                Some(c) => format!("{name}: f_max = {:.1e} γ after {} steps", c.f_max, outcome.steps),
+                _ if !outcome.message.is_empty() => {
+                    format!("{name}: \"{}\"", shortened(&outcome.message))
+                }
+                Some(c) => format!(
+                    "{name}: f_max = {:.1e} γ after {} steps",
+                    c.f_max, outcome.steps
+                ),
                 None => name,
             };
             self.reasons.entry(outcome.end).or_insert((0, first)).0 += 1;
@@ -76,7 +81,11 @@ impl Row {
 
     /// The row in one line, for a terminal.
     pub fn line(&self) -> String {
-        let reasons: Vec<String> = self.reasons.iter().map(|(k, v)| format!("{} {k}", v.0)).collect();
+        let reasons: Vec<String> = self
+            .reasons
+            .iter()
+            .map(|(k, v)| format!("{} {k}", v.0))
+            .collect();
         format!(
             "{} of {} converged, {} wrong{}{} ({:.1} s)",
             self.converged,
@@ -115,14 +124,22 @@ pub fn markdown(rows: &[Row]) -> String {
          | --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
     for r in rows {
-        let reasons: Vec<String> = r.reasons.iter().map(|(k, v)| format!("{} {k}", v.0)).collect();
+        let reasons: Vec<String> = r
+            .reasons
+            .iter()
+            .map(|(k, v)| format!("{} {k}", v.0))
+            .collect();
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {} | {:.1e} | {:.1e} | {} | {:.3} | {:.1} |",
             r.name,
             r.cases,
             r.converged,
-            if reasons.is_empty() { "–".into() } else { reasons.join(", ") },
+            if reasons.is_empty() {
+                "–".into()
+            } else {
+                reasons.join(", ")
+            },
             r.wrong.len(),
             r.f_max,
             r.law,

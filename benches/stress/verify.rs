@@ -115,10 +115,7 @@ impl Answer<'_> {
                 second = greater(second, depth / self.radii[i].max(self.radii[j]));
             }
         });
-        let f_max = net
-            .iter()
-            .map(|f| f[0].hypot(f[1]))
-            .fold(0.0, greater);
+        let f_max = net.iter().map(|f| f[0].hypot(f[1])).fold(0.0, greater);
         let finite = self.centres.iter().flatten().all(|x| x.is_finite())
             && self.forces.iter().all(|f| f.is_finite())
             && f_max.is_finite()
@@ -136,7 +133,10 @@ impl Answer<'_> {
                 .iter()
                 .map(|a| a.iter().map(|c| c.1).sum::<f64>() / (2.0 * PI))
                 .fold(0.0, greater),
-            pressure: contacts.iter().map(|c| c.3 * c.2[0].hypot(c.2[1])).sum::<f64>()
+            pressure: contacts
+                .iter()
+                .map(|c| c.3 * c.2[0].hypot(c.2[1]))
+                .sum::<f64>()
                 / (2.0 * self.sides[0] * self.sides[1]),
             finite,
         }
@@ -172,7 +172,9 @@ impl Answer<'_> {
             }
         };
         if cells[0] < 5.0 || cells[1] < 5.0 || n < 500 {
-            let images = self.sides.map(|l| (widest / l).ceil().clamp(1.0, 50.0) as i32);
+            let images = self
+                .sides
+                .map(|l| (widest / l).ceil().clamp(1.0, 50.0) as i32);
             for i in 0..n {
                 for j in i..n {
                     test(i, j, images);

@@ -156,10 +156,7 @@ mod tests {
         // 1 − (1 + x)/radius, without the cancellation.
         let dent = (b - 1.0) * x * (2.0 + x) / (radius * (radius + 1.0 + x));
         let model = 2.0 * PI * dent / (sides - PI / slope);
-        (
-            sides * model / (2.0 * PI),
-            1.0 - model / (2.0 * x * slope),
-        )
+        (sides * model / (2.0 * PI), 1.0 - model / (2.0 * x * slope))
     }
 
     /// The same between two plates at distance `2 R (1 − dent)`: `r/R = (1 + 2f/π)^(−1/2)` is half the distance.
@@ -205,7 +202,10 @@ mod tests {
             for n in 3..=24 {
                 let (squeeze, short) = polygon(n, x);
                 let bound = model_error(squeeze);
-                assert!(short <= bound + 1e-12 && short > 0.9 * bound, "n = {n}, x = {x}");
+                assert!(
+                    short <= bound + 1e-12 && short > 0.9 * bound,
+                    "n = {n}, x = {x}"
+                );
             }
             let (squeeze, short) = plates(0.2 * x);
             assert!(short <= model_error(squeeze) && short > 0.9 * model_error(squeeze));

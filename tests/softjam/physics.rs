@@ -11,3 +11,4 @@ mod golden;
 mod matrix;
 mod model;
 mod relaxation;
+mod stress;
