@@ -94,6 +94,7 @@ impl Domain {
     /// assert_eq!(domain.wrap(Vec2::new(-1e-30, 2.0)), Vec2::new(0.0, 0.0));
     /// ```
     #[must_use]
+    #[inline]
     pub fn wrap(&self, position: Vec2) -> Vec2 {
         Vec2::new(
             wrap(position.x, self.lengths.x),
@@ -122,12 +123,20 @@ impl Domain {
     }
 }
 
+#[inline]
 fn wrap(x: f64, length: f64) -> f64 {
-    // In the loop of a relaxation a coordinate leaves the box by a fraction of a radius, so the first three
-    // arms are the common ones; they are exact or rounded once.
-    let wrapped = if (0.0..length).contains(&x) {
+    if (0.0..length).contains(&x) {
         x
-    } else if x >= length && x < 2.0 * length {
+    } else {
+        wrap_outside(x, length)
+    }
+}
+
+#[cold]
+fn wrap_outside(x: f64, length: f64) -> f64 {
+    // In the loop of a relaxation a coordinate leaves the box by a fraction of a radius, so the first two
+    // arms are the common ones; they are rounded once.
+    let wrapped = if x >= length && x < 2.0 * length {
         x - length
     } else if x < 0.0 && x >= -length {
         x + length
@@ -142,16 +151,14 @@ fn wrap(x: f64, length: f64) -> f64 {
     }
 }
 
+/// The nearest image of a difference of two coordinates in `[0, length)`.
 #[inline]
-fn nearest(d: f64, length: f64) -> f64 {
+pub(crate) fn nearest(d: f64, length: f64) -> f64 {
     let half = 0.5 * length;
-    if d > half {
-        d - length
-    } else if d < -half {
-        d + length
-    } else {
-        d
-    }
+    // Selections instead of branches.
+    let above = if d > half { length } else { 0.0 };
+    let below = if d < -half { length } else { 0.0 };
+    d - above + below
 }
 
 #[cfg(test)]

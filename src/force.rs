@@ -54,11 +54,17 @@ pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
 /// ```
 #[must_use]
 pub fn largest_force(net: &[Vec2]) -> f64 {
-    let squared = net.iter().fold(0.0, |m: f64, f| {
-        let s = f.norm_squared();
-        // A NaN must not hide behind a comparison.
-        if s <= m { m } else { s }
-    });
+    let (net4, rest) = net.as_chunks::<4>();
+    // A NaN must not hide behind a comparison.
+    let larger = |m: f64, s: f64| if s <= m { m } else { s };
+    let mut most = [0.0; 4];
+    for f in net4 {
+        for k in 0..4 {
+            most[k] = larger(most[k], f[k].norm_squared());
+        }
+    }
+    let squared = most.into_iter().fold(0.0, larger);
+    let squared = rest.iter().map(Vec2::norm_squared).fold(squared, larger);
     squared.sqrt()
 }
 

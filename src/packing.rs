@@ -2,6 +2,7 @@
 
 use crate::domain::{Domain, Vec2};
 use core::f64::consts::PI;
+use std::sync::Arc;
 
 /// `N` particles of fixed undeformed radii in a periodic box.
 ///
@@ -26,7 +27,8 @@ use core::f64::consts::PI;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packing {
     domain: Domain,
-    radii: Vec<f64>,
+    /// Shared by the copies of a packing, since they never change.
+    radii: Arc<[f64]>,
     positions: Vec<Vec2>,
 }
 
@@ -114,7 +116,7 @@ impl Packing {
         }
         Ok(Self {
             domain,
-            radii,
+            radii: radii.into(),
             positions,
         })
     }
@@ -190,6 +192,12 @@ impl Packing {
         &mut self.positions
     }
 
+    /// Whether the box and the radii are those of `other`; for copies of one packing without a look at the radii.
+    pub(crate) fn same_particles(&self, other: &Self) -> bool {
+        self.domain == other.domain
+            && (Arc::ptr_eq(&self.radii, &other.radii) || self.radii == other.radii)
+    }
+
     /// The vector from particle `j` to the nearest image of particle `i`.
     ///
     /// # Panics
@@ -235,7 +243,7 @@ pub(crate) fn coverage(radii: &[f64], domain: Domain) -> f64 {
 pub(crate) fn unit_and_length(separation: Vec2) -> (Vec2, f64) {
     let r = (separation.x * separation.x + separation.y * separation.y).sqrt();
     if r > 0.0 {
-        (separation / r, r)
+        (separation * (1.0 / r), r)
     } else {
         (Vec2::new(1.0, 0.0), 0.0)
     }

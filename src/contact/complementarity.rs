@@ -18,14 +18,18 @@
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
+use super::geometry::Kept;
 use super::images::second_image;
-use super::law::{ContactError, ContactLaw};
+use super::law::{ACCEPTED, ContactError, ContactLaw};
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
 use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 const WIDEST_BULGE: f64 = 5.0;
+
+/// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
+const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,43 +82,74 @@ impl ContactLaw {
     /// Forces of the present set, and the pairs that offend, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
-        let scale = self.assemble(packing);
-        let iterations = self.solver.solve(
-            &self.matrix,
-            self.geometry.overlaps(),
-            &mut self.forces,
-            self.tolerance * scale,
-        )?;
+        self.assemble(packing);
+        let scale = self.scale();
+        let tolerance = self.allowed(scale);
+        let overlaps = self.geometry.overlaps();
+        let iterations = if tolerance > FAR_ABOVE_ROUND_OFF * scale {
+            self.solver
+                .solve_loosely(&self.matrix, overlaps, &mut self.forces, tolerance)
+        } else {
+            self.solver
+                .solve(&self.matrix, overlaps, &mut self.forces, tolerance)
+        }?;
         self.work.iterations += iterations as u64;
+        match self.solver.largest_residual() {
+            Some(largest) => self.off = largest,
+            None => self.measure_equation(),
+        }
         self.inspect(packing);
         Ok(())
     }
 
-    /// Geometry and matrix of the present set; returns the largest `|δ|`, the scale of all residuals.
-    pub(super) fn assemble(&mut self, packing: &Packing) -> f64 {
-        self.list.rebuild(packing.len(), &self.pairs);
-        self.geometry.rebuild(packing, &self.list);
+    /// Geometry and matrix of the present set at the present positions; what still stands is not done again.
+    pub(super) fn assemble(&mut self, packing: &Packing) {
+        if self.structured && self.refreshed {
+            return;
+        }
+        if !self.structured {
+            self.list.rebuild(packing.len(), &self.pairs);
+            if self.refreshed {
+                self.geometry.exchange(packing, &self.list, &self.kept);
+            } else {
+                self.geometry.restructure(&self.list);
+            }
+            let duplicate = self.geometry.duplicate();
+            self.matrix
+                .restructure(packing, &self.list, duplicate, self.line_tension);
+            self.work.structures += 1;
+        }
+        if !self.refreshed {
+            self.geometry.refresh(packing, &self.list);
+            self.work.assemblies += 1;
+        }
         self.matrix
-            .rebuild(packing, &self.list, &self.geometry, self.line_tension);
-        self.scale()
+            .refresh(packing, &self.geometry, self.line_tension);
+        (self.structured, self.refreshed) = (true, true);
     }
 
-    fn scale(&self) -> f64 {
+    /// The largest `|δ|`, the scale of all residuals.
+    pub(super) fn scale(&self) -> f64 {
         let overlaps = self.geometry.overlaps();
         overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()))
+    }
+
+    /// `max |A f − δ|` of the present forces.
+    pub(super) fn measure_equation(&mut self) {
+        self.image.resize(self.forces.len(), 0.0);
+        self.matrix.multiply(&self.forces, &mut self.image);
+        self.off = 0.0;
+        for (q, d) in self.image.iter().zip(self.geometry.overlaps()) {
+            self.off = self.off.max((d - q).abs());
+        }
     }
 
     /// Measures how far the present forces are from the contact law, and lists the pairs that offend.
     pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
-        self.image.resize(self.forces.len(), 0.0);
-        self.matrix.multiply(&self.forces, &mut self.image);
-        let mut worst: f64 = 0.0;
-        for (q, d) in self.image.iter().zip(self.geometry.overlaps()) {
-            worst = worst.max((q - d).abs());
-        }
         self.bound_bulges(packing);
-        worst = worst.max(self.find_offences(packing, self.accepted_residual() * scale));
+        let tolerance = ACCEPTED * self.allowed(scale);
+        let worst = self.off.max(self.find_offences(packing, tolerance));
         self.residual = if scale > 0.0 { worst / scale } else { worst };
     }
 
@@ -140,8 +175,12 @@ impl ContactLaw {
             largest = largest.max(*bulge);
         }
         let skin = 0.3 * packing.largest_radius();
-        self.neighbors
-            .update(packing, 2.0 * largest, skin + largest);
+        if self
+            .neighbors
+            .update(packing, 2.0 * largest, skin + largest)
+        {
+            self.parted = false;
+        }
     }
 
     /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
@@ -153,7 +192,7 @@ impl ContactLaw {
             &self.contacts(),
             self.line_tension,
             reach,
-            self.accepted_residual() * scale,
+            ACCEPTED * self.allowed(scale),
         ) {
             return Err(ContactError::BoxTooSmall {
                 particle,
@@ -172,31 +211,40 @@ impl ContactLaw {
         Ok(())
     }
 
+    /// The pairs of the neighbour list that are not in the set.
+    fn part(&mut self) {
+        if self.parted {
+            return;
+        }
+        self.others.clear();
+        let mut contacts = self.pairs.iter().peekable();
+        // Both ascend.
+        for &pair in self.neighbors.pairs() {
+            while contacts.next_if(|c| **c < pair).is_some() {}
+            if contacts.peek() != Some(&&pair) {
+                self.others.push(pair);
+            }
+        }
+        self.parted = true;
+    }
+
     /// Lists the pairs that offend by more than `tolerance` (length); returns the largest offence, below it or above.
     fn find_offences(&mut self, packing: &Packing, tolerance: f64) -> f64 {
+        self.part();
         self.offending.clear();
         let (radii, positions) = (packing.radii(), packing.positions());
         let domain = packing.domain();
         let mut worst: f64 = 0.0;
-        let mut contact = 0;
-        let drop_before = |contact: &mut usize, pair: [u32; 2], out: &mut Vec<Offence>| -> f64 {
-            let mut worst: f64 = 0.0;
-            while *contact < self.pairs.len() && self.pairs[*contact] <= pair {
-                let f = self.forces[*contact];
-                if f <= 0.0 {
-                    out.push(Offence::Drop(*contact, self.pairs[*contact]));
-                    worst = worst.max(-f * self.matrix.diagonal()[*contact]);
-                }
-                *contact += 1;
+        for (contact, &f) in self.forces.iter().enumerate() {
+            if f <= 0.0 {
+                self.offending
+                    .push(Offence::Drop(contact, self.pairs[contact]));
+                worst = worst.max(-f * self.matrix.diagonal()[contact]);
             }
-            worst
-        };
-        for &pair in self.neighbors.pairs() {
-            // Contacts are walked through in step with the candidates; both ascend.
-            worst = worst.max(drop_before(&mut contact, pair, &mut self.offending));
-            if contact > 0 && self.pairs[contact - 1] == pair {
-                continue;
-            }
+        }
+        let drops = self.offending.len();
+        self.work.distances += self.others.len() as u64;
+        for &pair in &self.others {
             let [i, j] = [pair[0] as usize, pair[1] as usize];
             let separation = domain.minimum_image(positions[i] - positions[j]);
             let reach = radii[i] + radii[j] + self.bulges[i] + self.bulges[j];
@@ -214,39 +262,72 @@ impl ContactLaw {
                 self.offending.push(Offence::Add(pair, -gap / compliance));
             }
         }
-        worst.max(drop_before(
-            &mut contact,
-            [u32::MAX; 2],
-            &mut self.offending,
-        ))
+        if drops > 0 && self.offending.len() > drops {
+            self.offending
+                .sort_unstable_by_key(|offence| offence.pair());
+        }
+        worst
     }
 
     /// Exchanges the first `count` offending pairs between the two sides.
     pub(super) fn exchange(&mut self, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
+        if count == 0 {
+            return;
+        }
+        self.kept.clear();
+        let mut begin = 0;
+        for offence in &self.offending[..count] {
+            let (end, then) = match *offence {
+                Offence::Drop(contact, _) => (contact, None),
+                Offence::Add(pair, _) => (self.pairs.partition_point(|p| *p < pair), Some(pair)),
+            };
+            let range = begin..end;
+            begin = end + usize::from(then.is_none());
+            self.kept.push(Kept { range, then });
+        }
+        let range = begin..self.pairs.len();
+        self.kept.push(Kept { range, then: None });
         let (pairs, forces) = &mut self.next;
         pairs.clear();
         forces.clear();
-        let mut kept = 0;
-        for offence in &self.offending[..count] {
-            let place = match *offence {
-                Offence::Drop(contact, _) => contact,
-                Offence::Add(pair, _) => self.pairs.partition_point(|p| *p < pair),
-            };
-            pairs.extend_from_slice(&self.pairs[kept..place]);
-            forces.extend_from_slice(&self.forces[kept..place]);
-            kept = place;
-            match *offence {
-                Offence::Drop(..) => kept += 1,
-                Offence::Add(pair, guess) => {
-                    pairs.push(pair);
-                    forces.push(guess);
-                }
+        let mut offences = self.offending.iter();
+        for kept in &self.kept {
+            pairs.extend_from_slice(&self.pairs[kept.range.clone()]);
+            forces.extend_from_slice(&self.forces[kept.range.clone()]);
+            if let Some(Offence::Add(pair, guess)) = offences.next()
+                && kept.then.is_some()
+            {
+                pairs.push(*pair);
+                forces.push(*guess);
             }
         }
-        pairs.extend_from_slice(&self.pairs[kept..]);
-        forces.extend_from_slice(&self.forces[kept..]);
         core::mem::swap(&mut self.pairs, pairs);
         core::mem::swap(&mut self.forces, forces);
+        self.structured = false;
+        self.part_again(count);
+    }
+
+    /// The pairs of the neighbour list that are not in the set, after the first `count` offending ones were exchanged.
+    fn part_again(&mut self, count: usize) {
+        const FEW: usize = 16;
+        if count > FEW {
+            self.parted = false;
+        }
+        for offence in &self.offending[..count.min(FEW)] {
+            let pair = offence.pair();
+            match (offence, self.others.binary_search(&pair)) {
+                (Offence::Drop(..), Err(place)) => {
+                    // Only what the neighbour list holds.
+                    if self.neighbors.pairs().binary_search(&pair).is_ok() {
+                        self.others.insert(place, pair);
+                    }
+                }
+                (Offence::Add(..), Ok(place)) => {
+                    self.others.remove(place);
+                }
+                _ => {}
+            }
+        }
     }
 }

@@ -137,6 +137,8 @@ pub struct DuplicateContactList {
     first: Vec<u32>,
     partner: Vec<u32>,
     contact: Vec<u32>,
+    /// Where contact c stands in the row of its lower and in that of its higher particle.
+    slots: Vec<[u32; 2]>,
     next: Vec<u32>,
 }
 
@@ -159,9 +161,12 @@ impl DuplicateContactList {
         let particles = contacts.particles();
         self.first.clear();
         self.first.resize(particles + 1, 0);
-        for [i, j] in contacts.pairs() {
-            self.first[i as usize + 1] += 1;
-            self.first[j as usize + 1] += 1;
+        for i in 0..particles {
+            let partners = contacts.partners(i);
+            self.first[i + 1] += partners.len() as u32;
+            for &j in partners {
+                self.first[j as usize + 1] += 1;
+            }
         }
         for i in 0..particles {
             self.first[i + 1] += self.first[i];
@@ -170,15 +175,32 @@ impl DuplicateContactList {
         self.next.extend_from_slice(&self.first);
         self.partner.resize(2 * contacts.len(), 0);
         self.contact.resize(2 * contacts.len(), 0);
+        self.slots.resize(contacts.len(), [0; 2]);
+        let (next, partner, contact) = (&mut *self.next, &mut *self.partner, &mut *self.contact);
+        let mut place = |c: u32, p: u32, q: u32| {
+            let next = &mut next[p as usize];
+            let slot = *next;
+            *next += 1;
+            (partner[slot as usize], contact[slot as usize]) = (q, c);
+            slot
+        };
         // Pairs ascend, so a particle meets first its lower partners and then its higher ones, each ascending.
-        for (c, [i, j]) in contacts.pairs().enumerate() {
-            for (p, q) in [(i, j), (j, i)] {
-                let slot = self.next[p as usize] as usize;
-                self.next[p as usize] += 1;
-                self.partner[slot] = q;
-                self.contact[slot] = c as u32;
+        let mut slots = (0..).zip(&mut self.slots);
+        for i in 0..particles as u32 {
+            for (&j, (c, slots)) in contacts.partners(i as usize).iter().zip(&mut slots) {
+                *slots = [place(c, i, j), place(c, j, i)];
             }
         }
+    }
+
+    /// Where each contact stands in the row of its lower and in that of its higher particle.
+    pub(crate) fn slots(&self) -> &[[u32; 2]] {
+        &self.slots
+    }
+
+    /// Number of particles.
+    pub(crate) fn particles(&self) -> usize {
+        self.first.len().saturating_sub(1)
     }
 
     /// The entries of particle `i`, as a range into rows that are parallel to this list.

@@ -1,174 +1,11 @@
-//! The geometry of a set of contacts and the matrix `A` that couples their forces, Saitoh (4)–(6).
+//! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
+
+pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
-use crate::domain::Vec2;
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
-use crate::packing::{Packing, unit_and_length};
+use crate::packing::Packing;
 use core::f64::consts::PI;
-
-/// Where the contacts of a list are: one entry a contact, in the list's order.
-///
-/// # Example
-///
-/// ```
-/// use softjam::contact::{list::ContactList, matrix::Geometry};
-/// use softjam::domain::{Domain, Vec2};
-/// use softjam::packing::Packing;
-///
-/// let at = |x| Vec2::new(x, 2.0);
-/// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
-/// let geometry = Geometry::of(&packing, &ContactList::new(2, &[[0, 1]]).unwrap());
-/// assert_eq!(geometry.normals(), [Vec2::new(-1.0, 0.0)]);
-/// assert!((geometry.overlaps()[0] - 0.1).abs() < 1e-15);
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct Geometry {
-    normals: Vec<Vec2>,
-    distances: Vec<f64>,
-    overlaps: Vec<f64>,
-    /// The direction from the lower particle to the higher.
-    directions: Vec<Direction>,
-    duplicate: DuplicateContactList,
-    /// Parallel to the duplicate list: the direction from the particle to its partner.
-    toward: Vec<Direction>,
-}
-
-impl Geometry {
-    /// The geometry of `contacts` in `packing`.
-    ///
-    /// # Panics
-    ///
-    /// If the list is of another number of particles.
-    ///
-    /// ```
-    /// # use softjam::contact::{list::ContactList, matrix::Geometry};
-    /// # use softjam::{domain::{Domain, Vec2}, packing::Packing};
-    /// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert!(Geometry::of(&packing, &ContactList::new(1, &[]).unwrap()).distances().is_empty());
-    /// ```
-    #[must_use]
-    pub fn of(packing: &Packing, contacts: &ContactList) -> Self {
-        let mut geometry = Self::default();
-        geometry.rebuild(packing, contacts);
-        geometry
-    }
-
-    pub(crate) fn rebuild(&mut self, packing: &Packing, contacts: &ContactList) {
-        assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
-        self.duplicate.rebuild(contacts);
-        self.normals.clear();
-        self.distances.clear();
-        self.overlaps.clear();
-        self.directions.clear();
-        for [i, j] in contacts.pairs() {
-            let (i, j) = (i as usize, j as usize);
-            let (normal, distance) = unit_and_length(packing.separation(i, j));
-            self.normals.push(normal);
-            self.distances.push(distance);
-            self.overlaps
-                .push(packing.radii()[i] + packing.radii()[j] - distance);
-            self.directions.push(Direction::of(-normal));
-        }
-        self.toward.clear();
-        for p in 0..packing.len() {
-            let (partners, numbers) = (self.duplicate.partners(p), self.duplicate.contacts(p));
-            for (&q, &c) in partners.iter().zip(numbers) {
-                let from_lower = self.directions[c as usize];
-                self.toward.push(if p < q as usize {
-                    from_lower
-                } else {
-                    from_lower.opposite()
-                });
-            }
-        }
-    }
-
-    /// The unit vectors `n_ij = (r_i − r_j)/r_ij`; the force on `i` is `+f_ij n_ij`.
-    ///
-    /// ```
-    /// # use softjam::contact::matrix::Geometry;
-    /// assert!(Geometry::default().normals().is_empty());
-    /// ```
-    #[must_use]
-    pub fn normals(&self) -> &[Vec2] {
-        &self.normals
-    }
-
-    /// The centre distances `r_ij` (length).
-    ///
-    /// ```
-    /// # use softjam::contact::matrix::Geometry;
-    /// assert!(Geometry::default().distances().is_empty());
-    /// ```
-    #[must_use]
-    pub fn distances(&self) -> &[f64] {
-        &self.distances
-    }
-
-    /// The overlaps of the undeformed disks `δ_ij = R_i + R_j − r_ij` (length); negative where only bulges meet.
-    ///
-    /// ```
-    /// # use softjam::contact::matrix::Geometry;
-    /// assert!(Geometry::default().overlaps().is_empty());
-    /// ```
-    #[must_use]
-    pub fn overlaps(&self) -> &[f64] {
-        &self.overlaps
-    }
-
-    /// The duplicate contact list that belongs to the contacts.
-    ///
-    /// ```
-    /// # use softjam::contact::{list::ContactList, matrix::Geometry};
-    /// # use softjam::{domain::{Domain, Vec2}, packing::Packing};
-    /// # let at = |x| Vec2::new(x, 2.0);
-    /// # let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
-    /// let geometry = Geometry::of(&packing, &ContactList::new(2, &[[0, 1]]).unwrap());
-    /// assert_eq!(geometry.duplicate().partners(1), [0]);
-    /// ```
-    #[must_use]
-    pub fn duplicate(&self) -> &DuplicateContactList {
-        &self.duplicate
-    }
-
-    /// The directions from particle `p` to its partners, in the order of the duplicate list.
-    pub(crate) fn toward(&self, p: usize) -> &[Direction] {
-        &self.toward[self.duplicate.entries(p)]
-    }
-
-    /// The gap between the deformed contours of particles `i < j` that are not in contact (length):
-    /// `r_ij − ρ_i(θ_j) − ρ_j(θ_i)`, which is `−Δ_ij` in Saitoh 2.2.4.
-    ///
-    /// `forces` has one entry a contact, `line_tension` is γ.
-    pub(crate) fn gap(
-        &self,
-        packing: &Packing,
-        line_tension: f64,
-        forces: &[f64],
-        i: usize,
-        j: usize,
-    ) -> f64 {
-        let (normal, distance) = unit_and_length(packing.separation(i, j));
-        let overlap = packing.radii()[i] + packing.radii()[j] - distance;
-        let to_j = Direction::of(-normal);
-        let bulge = |p: usize, direction: Direction| {
-            let scale = packing.radii()[p] / (2.0 * PI * line_tension);
-            self.displacement(scale, p, direction, forces)
-        };
-        -overlap - bulge(i, to_j) - bulge(j, to_j.opposite())
-    }
-
-    /// `ΔR_p` in a direction, Saitoh (3): `scale Σ_k f_pk g(θ − θ_k)` with `scale = R_p / 2πγ`.
-    fn displacement(&self, scale: f64, p: usize, direction: Direction, forces: &[f64]) -> f64 {
-        let sum: f64 = self
-            .toward(p)
-            .iter()
-            .zip(self.duplicate.contacts(p))
-            .map(|(d, &c)| forces[c as usize] * direction.g_between(*d))
-            .sum();
-        scale * sum
-    }
-}
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
 ///
@@ -178,8 +15,13 @@ impl Geometry {
 /// ```
 ///
 /// Every Fourier coefficient of `−g` is ≥ 0, hence `A` is positive definite as long as the contacts of each particle
-/// lie at distinct angles. Stored by rows without the diagonal; one entry is computed for the two places it fills, so
-/// the matrix is symmetric to the last bit. Unit: length per force.
+/// lie at distinct angles. Unit: length per force.
+///
+/// Stored particle by particle, as the sum above is written: a particle with `z` contacts gives a symmetric block of
+/// `z (z − 1)/2` entries, each computed and stored once for its two places, so the matrix is symmetric to the last bit.
+/// A product with a vector then reads half the numbers that rows would hold, and one index a contact and particle
+/// instead of one an entry. Blocks of one size stand together (within stretches of 2048 particles, to stay near each
+/// other in memory), so that each size has a loop of its own without branches.
 ///
 /// # Example
 ///
@@ -200,11 +42,29 @@ impl Geometry {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactMatrix {
     diagonal: Vec<f64>,
-    /// Row c is `first[c]..first[c + 1]` of `column` and `value`: first the contacts that share `i`, then those of `j`.
-    first: Vec<u32>,
-    column: Vec<u32>,
+    inverse_diagonal: Vec<f64>,
+    /// The particle of each block.
+    particle: Vec<u32>,
+    /// Where each block's contacts and values begin, and where the last ends.
+    start: Vec<[u32; 2]>,
+    /// Stretches of blocks of one size: the number of contacts in a block, and the number of blocks.
+    runs: Vec<(usize, usize)>,
+    /// The contacts of the blocks.
+    contact: Vec<u32>,
+    /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
+    /// The blocks of each contact's lower and higher particle, [`NO_BLOCK`] where it is the only contact.
+    ends: Vec<[u32; 2]>,
 }
+
+/// A particle with one contact couples it to none.
+const NO_BLOCK: u32 = u32::MAX;
+
+/// Particles whose blocks are sorted by size together.
+const STRETCH: usize = 2048;
+
+/// Blocks with more contacts than this share one stretch and have a run each.
+const LARGEST_SORTED: usize = 7;
 
 impl ContactMatrix {
     /// The matrix of `contacts`, `line_tension` being γ (force, positive).
@@ -235,45 +95,107 @@ impl ContactMatrix {
         geometry: &Geometry,
         line_tension: f64,
     ) {
+        self.restructure(packing, contacts, geometry.duplicate(), line_tension);
+        self.refresh(packing, geometry, line_tension);
+    }
+
+    /// Everything that depends on which particles touch, and not on where they are.
+    pub(crate) fn restructure(
+        &mut self,
+        packing: &Packing,
+        contacts: &ContactList,
+        duplicate: &DuplicateContactList,
+        line_tension: f64,
+    ) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
-        let others = |p: u32| geometry.duplicate.entries(p as usize).len() as u32 - 1;
-        self.diagonal.clear();
-        self.first.clear();
-        self.first.push(0);
-        let mut end = 0;
-        for [i, j] in contacts.pairs() {
-            let sum = radii[i as usize] + radii[j as usize];
-            self.diagonal.push(-G_AT_CONTACT * per_radius * sum);
-            end += others(i) + others(j);
-            self.first.push(end);
+        self.diagonal.resize(contacts.len(), 0.0);
+        self.inverse_diagonal.resize(contacts.len(), 0.0);
+        let mut rows = self.diagonal.iter_mut();
+        for (i, radius) in radii.iter().enumerate() {
+            for (&j, compliance) in contacts.partners(i).iter().zip(&mut rows) {
+                let sum = radius + radii[j as usize];
+                *compliance = -G_AT_CONTACT * per_radius * sum;
+            }
         }
-        self.column.resize(end as usize, 0);
+        for (inverse, compliance) in self.inverse_diagonal.iter_mut().zip(&self.diagonal) {
+            *inverse = 1.0 / compliance;
+        }
+        self.sort_blocks(duplicate);
+        self.ends.clear();
+        self.ends.resize(contacts.len(), [NO_BLOCK; 2]);
+        self.start.clear();
+        self.contact.clear();
+        let mut end = 0;
+        for (block, &p) in self.particle.iter().enumerate() {
+            let numbers = duplicate.contacts(p as usize);
+            let partners = duplicate.partners(p as usize);
+            self.start.push([self.contact.len() as u32, end]);
+            self.contact.extend_from_slice(numbers);
+            end += (numbers.len() * (numbers.len() - 1) / 2) as u32;
+            for (&c, &q) in numbers.iter().zip(partners) {
+                self.ends[c as usize][usize::from(q < p)] = block as u32;
+            }
+        }
+        self.start.push([self.contact.len() as u32, end]);
         self.value.resize(end as usize, 0.0);
-        for (p, radius) in radii.iter().enumerate() {
-            let scale = -radius * per_radius;
-            let toward = geometry.toward(p);
-            let numbers = geometry.duplicate.contacts(p);
-            let partners = geometry.duplicate.partners(p);
-            // Where p's part of row c begins: at its start if p is the lower particle, else behind the partner's part.
-            let part = |a: usize| {
-                let row = self.first[numbers[a] as usize] as usize;
-                if (partners[a] as usize) < p {
-                    row + others(partners[a]) as usize
-                } else {
-                    row
+    }
+
+    /// The order of the blocks: within each stretch of particles by size, then by particle.
+    fn sort_blocks(&mut self, duplicate: &DuplicateContactList) {
+        const SIZES: usize = LARGEST_SORTED + 2;
+        self.particle.clear();
+        self.runs.clear();
+        let size = |p: usize| duplicate.entries(p).len();
+        let particles = duplicate.particles();
+        for begin in (0..particles).step_by(STRETCH) {
+            let stretch = begin..particles.min(begin + STRETCH);
+            let mut next = [0; SIZES];
+            for p in stretch.clone() {
+                next[size(p).min(SIZES - 1)] += 1;
+            }
+            let mut end = self.particle.len();
+            for (z, count) in next.iter_mut().enumerate().skip(2) {
+                if *count > 0 && z <= LARGEST_SORTED {
+                    self.runs.push((z, *count));
                 }
-            };
-            for a in 0..toward.len() {
-                let row_a = part(a);
-                for b in a + 1..toward.len() {
-                    let value = scale * toward[a].g_between(toward[b]);
-                    // Each row leaves itself out.
-                    let (in_a, in_b) = (row_a + b - 1, part(b) + a);
-                    self.column[in_a] = numbers[b];
-                    self.value[in_a] = value;
-                    self.column[in_b] = numbers[a];
-                    self.value[in_b] = value;
+                (*count, end) = (end, end + *count);
+            }
+            self.particle.resize(end, 0);
+            for p in stretch.clone().filter(|&p| size(p) > 1) {
+                let slot = &mut next[size(p).min(SIZES - 1)];
+                self.particle[*slot] = p as u32;
+                *slot += 1;
+            }
+            let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
+            self.runs.extend(large.map(|z| (z, 1)));
+        }
+    }
+
+    /// The values, from the directions of the contacts.
+    pub(crate) fn refresh(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
+        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let (mut block, mut value) = (0, 0);
+        for &(z, count) in &self.runs {
+            let pairs = z * (z - 1) / 2;
+            let particles = &self.particle[block..block + count];
+            let values = &mut self.value[value..value + count * pairs];
+            (block, value) = (block + count, value + count * pairs);
+            let blocks = particles.iter().map(|&p| {
+                let p = p as usize;
+                (-packing.radii()[p] * per_radius, geometry.toward(p))
+            });
+            match z {
+                2 => fill::<2, 1>(blocks, values),
+                3 => fill::<3, 3>(blocks, values),
+                4 => fill::<4, 6>(blocks, values),
+                5 => fill::<5, 10>(blocks, values),
+                6 => fill::<6, 15>(blocks, values),
+                7 => fill::<7, 21>(blocks, values),
+                _ => {
+                    for ((scale, toward), values) in blocks.zip(values.chunks_exact_mut(pairs)) {
+                        fill_block(scale, toward, values);
+                    }
                 }
             }
         }
@@ -312,17 +234,29 @@ impl ContactMatrix {
         &self.diagonal
     }
 
+    /// `1/A_cc`.
+    pub(crate) fn inverse_diagonal(&self) -> &[f64] {
+        &self.inverse_diagonal
+    }
+
     /// The off-diagonal entries of row `c` as `(column, value)`, in no particular order of columns.
     ///
     /// # Panics
     ///
     /// If there is no row `c`. See the example of [`ContactMatrix`].
     pub fn row(&self, c: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let range = self.first[c] as usize..self.first[c + 1] as usize;
-        self.column[range.clone()]
-            .iter()
-            .map(|&k| k as usize)
-            .zip(self.value[range].iter().copied())
+        let blocks = self.ends[c].into_iter().filter(|b| *b != NO_BLOCK);
+        blocks.flat_map(move |block| {
+            let [first, values] = self.start[block as usize].map(|s| s as usize);
+            let end = self.start[block as usize + 1][0] as usize;
+            let contacts = &self.contact[first..end];
+            let own = contacts.iter().position(|&k| k as usize == c).unwrap_or(0);
+            let others = contacts.iter().enumerate().filter(move |(k, _)| *k != own);
+            others.map(move |(k, &column)| {
+                let (a, b) = (own.min(k), own.max(k));
+                (column as usize, self.value[values + b * (b - 1) / 2 + a])
+            })
+        })
     }
 
     /// Number of off-diagonal entries.
@@ -333,7 +267,7 @@ impl ContactMatrix {
     /// ```
     #[must_use]
     pub fn off_diagonals(&self) -> usize {
-        self.value.len()
+        2 * self.value.len()
     }
 
     /// `y = A x`.
@@ -349,22 +283,93 @@ impl ContactMatrix {
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
-        for c in 0..n {
-            let range = self.first[c] as usize..self.first[c + 1] as usize;
-            // Two chains of sums hide the latency of an addition; their order is part of the result.
-            let mut even = self.diagonal[c] * x[c];
-            let mut odd = 0.0;
-            let (columns, values) = (&self.column[range.clone()], &self.value[range]);
-            let (column_pairs, last_column) = columns.as_chunks::<2>();
-            let (value_pairs, last_value) = values.as_chunks::<2>();
-            for (k, v) in column_pairs.iter().zip(value_pairs) {
-                even += v[0] * x[k[0] as usize];
-                odd += v[1] * x[k[1] as usize];
+        for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
+            *y = d * x;
+        }
+        self.add_off_diagonal(x, y);
+    }
+
+    /// `y += (A − diag A) x`.
+    pub(crate) fn add_off_diagonal(&self, x: &[f64], y: &mut [f64]) {
+        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
+        for &(z, count) in &self.runs {
+            let (c, v);
+            (c, contacts) = contacts.split_at(count * z);
+            (v, values) = values.split_at(count * (z * (z - 1) / 2));
+            match z {
+                2 => product::<2, 1>(c, v, x, y),
+                3 => product::<3, 3>(c, v, x, y),
+                4 => product::<4, 6>(c, v, x, y),
+                5 => product::<5, 10>(c, v, x, y),
+                6 => product::<6, 15>(c, v, x, y),
+                7 => product::<7, 21>(c, v, x, y),
+                _ => product_of_block(c, v, x, y),
             }
-            if let ([k], [v]) = (last_column, last_value) {
-                even += v * x[*k as usize];
+        }
+    }
+}
+
+/// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.
+#[inline]
+fn fill<'a, const Z: usize, const T: usize>(
+    blocks: impl Iterator<Item = (f64, &'a [Direction])>,
+    values: &mut [f64],
+) {
+    for ((scale, toward), values) in blocks.zip(values.as_chunks_mut::<T>().0) {
+        if let Some(toward) = toward.first_chunk::<Z>() {
+            for b in 1..Z {
+                for a in 0..b {
+                    values[b * (b - 1) / 2 + a] = scale * toward[a].g_between(toward[b]);
+                }
             }
-            y[c] = even + odd;
+        }
+    }
+}
+
+fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
+    let mut values = values.iter_mut();
+    for b in 1..toward.len() {
+        for (a, value) in toward[..b].iter().zip(&mut values) {
+            *value = scale * a.g_between(toward[b]);
+        }
+    }
+}
+
+/// `y += A x` of blocks of `Z` contacts.
+#[inline]
+fn product<const Z: usize, const T: usize>(
+    contacts: &[u32],
+    values: &[f64],
+    x: &[f64],
+    y: &mut [f64],
+) {
+    let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
+    for (c, v) in contacts.iter().zip(values) {
+        let mut at = [0.0; Z];
+        for (at, c) in at.iter_mut().zip(c) {
+            *at = x[*c as usize];
+        }
+        let mut sum = [0.0; Z];
+        for b in 1..Z {
+            for a in 0..b {
+                let entry = v[b * (b - 1) / 2 + a];
+                sum[a] += entry * at[b];
+                sum[b] += entry * at[a];
+            }
+        }
+        for (c, sum) in c.iter().zip(sum) {
+            y[*c as usize] += sum;
+        }
+    }
+}
+
+/// `y += A x` of one block of any size.
+fn product_of_block(contacts: &[u32], values: &[f64], x: &[f64], y: &mut [f64]) {
+    let mut values = values.iter();
+    for (b, &cb) in contacts.iter().enumerate() {
+        for (&ca, entry) in contacts[..b].iter().zip(&mut values) {
+            y[ca as usize] += entry * x[cb as usize];
+            y[cb as usize] += entry * x[ca as usize];
         }
     }
 }

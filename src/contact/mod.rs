@@ -21,13 +21,15 @@
 //! added behind it.
 
 pub mod complementarity;
+mod geometry;
 mod images;
 mod law;
 pub mod list;
 pub mod matrix;
 pub mod solver;
 
-pub use law::{ContactError, ContactLaw, Rule, Work};
+pub(crate) use law::ACCEPTED;
+pub use law::{ContactError, ContactLaw, Rule, Work, due_tolerance};
 
 use crate::domain::Vec2;
 use crate::frame::Frame;

@@ -17,6 +17,7 @@
 //! with the Fourier series `g(θ) = −Σ_{m ≥ 2} 2/(m² − 1) cos mθ`. The derivation is in D. C. Morse and T. A. Witten,
 //! EPL 22, 549 (1993), and F. F. Dunne et al., Phil. Mag. 99, 2303 (2019); the tests below check it independently.
 
+pub(crate) use super::angle::Angles;
 use core::f64::consts::PI;
 
 /// `g(0)`: the dent under the contact itself.
@@ -125,10 +126,16 @@ impl Direction {
     #[must_use]
     #[inline]
     pub fn of(unit: crate::domain::Vec2) -> Self {
+        Self::with(Angles::new(), unit)
+    }
+
+    /// [`of`](Self::of), for many of them.
+    #[inline]
+    pub(crate) fn with(angles: Angles, unit: crate::domain::Vec2) -> Self {
         Self {
             cos: unit.x,
             sin: unit.y,
-            angle: libm::atan2(unit.y, unit.x),
+            angle: angles.of(unit),
         }
     }
 
@@ -155,7 +162,7 @@ impl Direction {
 
     /// `g` of the angle between two directions; the same bits whichever of the two is named first.
     ///
-    /// The angle is a difference of two `atan2`, its sine and cosine come from the vectors: no `acos`, which would
+    /// The angle is a difference of two angles to the x axis, its sine and cosine come from the vectors: no `acos`, which would
     /// lose half of the digits near 0 and π.
     ///
     /// ```
@@ -169,9 +176,9 @@ impl Direction {
     pub fn g_between(self, other: Self) -> f64 {
         let difference = self.angle - other.angle; // in [−2π, 2π]
         let cross = self.sin * other.cos - self.cos * other.sin; // sine of the difference
-        let sin = if difference < 0.0 { -cross } else { cross };
         let cos = self.cos * other.cos + self.sin * other.sin;
-        g_of(difference.abs(), sin, cos)
+        // (π − θ) sin θ with θ = |difference|; the two signs cancel without a branch.
+        (PI.copysign(difference) - difference) * cross - 0.5 * cos - 1.0
     }
 }
 

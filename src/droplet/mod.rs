@@ -4,6 +4,7 @@
 //! forces its contour is the circle plus one copy of the kernel [`kernel::g`] for each contact force,
 //! Saitoh (1)–(3).
 
+mod angle;
 pub mod contour;
 pub mod kernel;
 pub mod validity;

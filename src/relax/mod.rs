@@ -22,7 +22,7 @@
 pub mod fire;
 pub mod frequency;
 
-use crate::contact::{ContactError, ContactLaw, Contacts};
+use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
 use crate::force::{Observables, largest_force, net_forces};
@@ -246,7 +246,9 @@ impl Relaxation {
         self.step += 1;
         let dt = self.state.dt;
         let far = 0.25 * domain.shortest();
-        let thrown = |v: &Vec2| (v * dt).norm() > far || v.norm().is_nan();
+        // A NaN is thrown too.
+        let within = |v: &Vec2| (v * dt).norm_squared() <= far * far;
+        let thrown = |v: &Vec2| !within(v);
         if let Some(particle) = self.velocities.iter().position(thrown) {
             self.failed = true;
             return Err(RelaxError::TooFar {
@@ -257,13 +259,55 @@ impl Relaxation {
                 dt_max: self.state.dt_max,
             });
         }
-        if let Err(source) = self.law.solve_again(&self.packing) {
+        if let Err(source) = self.solve() {
             self.failed = true;
             let step = self.step;
             return Err(RelaxError::Contact { step, source });
         }
-        self.balance();
         Ok(())
+    }
+
+    /// The contact problem at the new positions, to the tolerance that is due at the `f_max` that its forces give.
+    ///
+    /// The tolerance at first is that of the frame before; it is a function of that frame, so a run that is taken up there
+    /// takes the same way.
+    fn solve(&mut self) -> Result<(), ContactError> {
+        let mut due = self.due(self.f_max);
+        self.law.solve_within(&self.packing, due)?;
+        self.balance();
+        // The full tolerance, due at 0, keeps every promise; a frame that might be the last is always solved to it.
+        while due > 0.0
+            && (self.due(self.f_max) == 0.0 || self.law.residual() > self.promised_residual())
+        {
+            due = if self.f_max < due {
+                self.due(0.5 * self.f_max)
+            } else {
+                0.0
+            };
+            self.law.tighten(&self.packing, due)?;
+            self.balance();
+        }
+        Ok(())
+    }
+
+    /// The `f_max` that the tolerance follows: 0, for the full tolerance, in a frame that might be the last.
+    fn due(&self, f_max: f64) -> f64 {
+        if f_max > self.threshold { f_max } else { 0.0 }
+    }
+
+    /// The residual of the contact law that this frame keeps to, relative to the largest `|δ|` of its contacts: sixteen
+    /// times the [tolerance](crate::contact::due_tolerance) at its `f_max`, at the full tolerance if `f_max` is not above the
+    /// threshold.
+    ///
+    /// ```
+    /// # use softjam::{relax::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.law().residual() <= run.promised_residual());
+    /// ```
+    #[must_use]
+    pub fn promised_residual(&self) -> f64 {
+        let due = self.due(self.f_max);
+        ACCEPTED * self.law.tolerance_at(&self.packing, due)
     }
 
     fn balance(&mut self) {

@@ -6,7 +6,7 @@
 
 use crate::contact::list::ContactList;
 use crate::contact::matrix::{ContactMatrix, Geometry};
-use crate::contact::{ContactError, ContactLaw, FrameContacts, Rule};
+use crate::contact::{ACCEPTED, ContactError, ContactLaw, FrameContacts, Rule, due_tolerance};
 use crate::domain::Vec2;
 use crate::force::{Observables, largest_force, net_forces};
 use crate::frame::Frame;
@@ -17,6 +17,8 @@ use crate::scene::Scene;
 /// The worst of each residual over the frames, with the step at which it occurred.
 ///
 /// Residuals of lengths are relative to the largest `|δ|` among the frame's contacts, those of forces to its largest force.
+/// Each frame is held to the tolerance that is [due](crate::contact::due_tolerance) at its own `f_max`, the converged one
+/// to the scene's.
 ///
 /// ```
 /// let worst = softjam::replay::Worst::default();
@@ -24,19 +26,42 @@ use crate::scene::Scene;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Worst {
-    /// The largest value.
+    /// The value that is the largest part of what its frame allows.
     pub value: f64,
+    /// What that frame allows.
+    pub allowed: f64,
     /// The step at which it occurred.
     pub step: u64,
 }
 
 impl Worst {
-    fn of(&mut self, value: f64, step: u64) {
+    fn of(&mut self, value: f64, allowed: f64, step: u64) {
         // A NaN is worse than any number, and stays.
-        if value > self.value || value.is_nan() {
-            *self = Self { value, step };
+        let worse = value * self.allowed > self.value * allowed
+            || (value > 0.0 && allowed <= 0.0 && value > self.value)
+            || (value > 0.0 && self.value == 0.0);
+        if (worse && !self.value.is_nan()) || value.is_nan() {
+            *self = Self {
+                value,
+                allowed,
+                step,
+            };
         }
     }
+
+    fn within(&self) -> bool {
+        self.value <= self.allowed
+    }
+}
+
+/// What the residuals of a frame may be.
+#[derive(Clone, Copy)]
+struct Allowed {
+    step: u64,
+    /// Of lengths: what its `f_max` promises.
+    lengths: f64,
+    /// Of forces, which a matrix of condition 6 amplifies.
+    forces: f64,
 }
 
 /// What the frames seen so far are worth.
@@ -57,6 +82,7 @@ pub struct Balance {
     law: ContactLaw,
     rule: Rule,
     threshold: f64,
+    tolerance: f64,
     /// `max |A f − δ|` of the recorded forces: Saitoh (4).
     pub equation_4: Worst,
     /// The deepest overlap of deformed contours among pairs that are no contacts, `−gap`.
@@ -77,8 +103,11 @@ pub struct Balance {
     pub failed: Option<(u64, ContactError)>,
 }
 
-/// How far a residual may be from zero: the solver's tolerance, its amplification by a matrix of condition 6, and round-off.
+/// How far a residual may always be from zero: round-off, and the full tolerance amplified by a matrix of condition 6.
 const ALLOWED: f64 = 1e-9;
+
+/// How much larger a residual of forces may be than one of lengths: the condition number of `A` is about 6.
+const AMPLIFIED: f64 = 8.0;
 
 impl Balance {
     /// Nothing seen yet of a recording of `scene`.
@@ -95,6 +124,7 @@ impl Balance {
             ),
             rule: scene.contact_rule,
             threshold: scene.threshold,
+            tolerance: scene.contact_tolerance,
             equation_4: Worst::default(),
             overlap: Worst::default(),
             pull: Worst::default(),
@@ -121,6 +151,11 @@ impl Balance {
         let view = recorded.view();
         let scale = view.overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
         let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
+        let mut net = vec![Vec2::zeros(); packing.len()];
+        net_forces(&view, &mut net);
+        let f_max = largest_force(&net) / self.law.line_tension();
+        self.last = Some((step, f_max));
+        let allowed = self.allowed(packing, view.overlaps, f_max, step);
         // Eq. (4), row by row.
         if let Some(list) = ContactList::new(packing.len(), view.pairs) {
             let geometry = Geometry::of(packing, &list);
@@ -129,24 +164,37 @@ impl Balance {
             for (c, delta) in view.overlaps.iter().enumerate() {
                 let row: f64 = matrix.row(c).map(|(k, a)| a * view.forces[k]).sum();
                 let residual = matrix.diagonal()[c] * view.forces[c] + row - delta;
-                self.equation_4.of(relative(residual.abs()), step);
+                self.equation_4
+                    .of(relative(residual.abs()), allowed.lengths, step);
             }
-            self.check_gaps(packing, &list, &geometry, view.forces, scale, step);
+            self.check_gaps(packing, &list, &geometry, view.forces, scale, allowed);
         }
         let strongest = view.forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
         for f in view.forces {
-            self.pull
-                .of(if strongest > 0.0 { -f / strongest } else { -f }, step);
+            let pull = if strongest > 0.0 { -f / strongest } else { -f };
+            self.pull.of(pull, 0.0, step);
         }
-        let mut net = vec![Vec2::zeros(); packing.len()];
-        net_forces(&view, &mut net);
-        self.last = Some((step, largest_force(&net) / self.law.line_tension()));
         match self.law.solve(packing, &[], &[]) {
             Ok(()) => {
-                self.compare(view.pairs, view.forces, strongest, step);
-                self.compare_metrics(packing, metrics, step);
+                self.compare(view.pairs, view.forces, strongest, allowed);
+                self.compare_metrics(packing, metrics, allowed);
             }
             Err(error) => self.failed = self.failed.take().or(Some((step, error))),
+        }
+    }
+
+    /// What the frame's `f_max` promises.
+    fn allowed(&self, packing: &Packing, overlaps: &[f64], f_max: f64, step: u64) -> Allowed {
+        let due = if f_max > self.threshold && self.rule == Rule::Complementarity {
+            f_max
+        } else {
+            0.0
+        };
+        let promised = ACCEPTED * due_tolerance(packing, overlaps, due, self.tolerance);
+        Allowed {
+            step,
+            lengths: promised.max(ALLOWED),
+            forces: (AMPLIFIED * promised).max(ALLOWED),
         }
     }
 
@@ -158,7 +206,7 @@ impl Balance {
         geometry: &Geometry,
         forces: &[f64],
         scale: f64,
-        step: u64,
+        allowed: Allowed,
     ) {
         let gamma = self.law.line_tension();
         let mut neighbors = crate::neighbors::NeighborList::new();
@@ -168,13 +216,13 @@ impl Balance {
             if list.partners(i as usize).binary_search(&j).is_err() {
                 let gap = geometry.gap(packing, gamma, forces, i as usize, j as usize);
                 let overlap = if scale > 0.0 { -gap / scale } else { -gap };
-                self.overlap.of(overlap, step);
+                self.overlap.of(overlap, allowed.lengths, allowed.step);
             }
         }
     }
 
     /// Recorded contacts and forces against those found anew.
-    fn compare(&mut self, pairs: &[[u32; 2]], forces: &[f64], strongest: f64, step: u64) {
+    fn compare(&mut self, pairs: &[[u32; 2]], forces: &[f64], strongest: f64, allowed: Allowed) {
         let anew = self.law.contacts();
         let (mut a, mut b) = (0, 0);
         let (mut lonely, mut worst): (u64, f64) = (0, 0.0);
@@ -194,22 +242,22 @@ impl Balance {
                 }
                 (Some(p), q) if q.is_none_or(|q| p < q) => {
                     worst = worst.max(relative(forces[a]));
-                    lonely += u64::from(relative(forces[a]) > ALLOWED);
+                    lonely += u64::from(relative(forces[a]) > allowed.forces);
                     a += 1;
                 }
                 _ => {
                     worst = worst.max(relative(anew.forces[b]));
-                    lonely += u64::from(relative(anew.forces[b]) > ALLOWED);
+                    lonely += u64::from(relative(anew.forces[b]) > allowed.forces);
                     b += 1;
                 }
             }
         }
-        self.forces.of(worst, step);
-        self.contacts.of(lonely as f64, step);
+        self.forces.of(worst, allowed.forces, allowed.step);
+        self.contacts.of(lonely as f64, 0.0, allowed.step);
     }
 
     /// Recorded energy and pressure against those of the contacts found anew.
-    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(String, f64)], step: u64) {
+    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(String, f64)], allowed: Allowed) {
         let (domain, gamma) = (packing.domain(), self.law.line_tension());
         let anew = Observables::of(
             &self.law.contacts(),
@@ -226,29 +274,29 @@ impl Balance {
             };
             let scale = value.abs().max(recorded.abs());
             if scale > 0.0 || recorded.is_nan() {
+                let difference = (value - recorded).abs() / scale;
                 self.energy_and_pressure
-                    .of((value - recorded).abs() / scale, step);
+                    .of(difference, allowed.forces, allowed.step);
             }
         }
     }
 
-    /// Whether all frames seen fulfil the contact law to round-off. With the seed's rule contacts lag behind their
+    /// Whether all frames seen fulfil the contact law to the tolerance that is due in them. With the seed's rule contacts lag behind their
     /// positions by a step, so only the last frame is asked for: its step must not be among the worst.
     ///
     /// See the example of [`Balance`].
     #[must_use]
     pub fn agrees(&self) -> bool {
         let last = self.last.map_or(0, |(step, _)| step);
-        let within = |worst: &Worst, allowed: f64| {
-            worst.value <= allowed || (self.rule == Rule::Seed && worst.step != last)
-        };
+        let within =
+            |worst: &Worst| worst.within() || (self.rule == Rule::Seed && worst.step != last);
         self.failed.is_none()
-            && within(&self.equation_4, ALLOWED)
-            && within(&self.overlap, ALLOWED)
-            && within(&self.pull, 0.0)
-            && within(&self.forces, ALLOWED)
-            && within(&self.energy_and_pressure, ALLOWED)
-            && within(&self.contacts, 0.0)
+            && within(&self.equation_4)
+            && within(&self.overlap)
+            && within(&self.pull)
+            && within(&self.forces)
+            && within(&self.energy_and_pressure)
+            && within(&self.contacts)
     }
 
     /// Whether the last frame bears out a result: a converged run ends with `f_max` not above its threshold.

@@ -3,6 +3,10 @@
 //! Random numbers come from the ChaCha8 generator (D. J. Bernstein), keyed with the seed in little-endian bytes followed
 //! by zeros; a number in `[0, 1)` is the upper 53 bits of one 64-bit word. That is part of what a seed means: the same
 //! seed gives the same start on every platform and in every version.
+//!
+//! In a random start radii and positions are drawn first, in this order; then the particles are numbered along Morton's
+//! curve (G. M. Morton, IBM Ltd., 1966), so that particles near each other have numbers near each other and stand near
+//! each other in memory. Numbers mean nothing to the physics.
 
 use super::{Radii, Scene, SceneError, Species, Start};
 use crate::domain::{Domain, Vec2};
@@ -35,13 +39,22 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
             let radii = radii(scene, &mut random);
             let domain = domain(scene, &radii, scene.aspect)?;
             let l = domain.lengths();
-            let positions = (0..radii.len())
-                .map(|_| {
-                    let x = random.uniform();
-                    Vec2::new(x * l.x, random.uniform() * l.y)
-                })
+            let positions = (0..radii.len()).map(|_| {
+                let x = random.uniform();
+                Vec2::new(x * l.x, random.uniform() * l.y)
+            });
+            let mut particles: Vec<(u64, Vec2, f64)> = positions
+                .zip(radii)
+                .map(|(p, radius)| (along_curve(p, domain), p, radius))
                 .collect();
-            make(domain, radii, positions)?
+            // A stable sort: the same numbers everywhere, whatever lies in one square.
+            particles.sort_by_key(|(place, ..)| *place);
+            let radii = particles.iter().map(|(_, _, radius)| *radius).collect();
+            make(
+                domain,
+                radii,
+                particles.iter().map(|(_, p, _)| *p).collect(),
+            )?
         }
         Start::Hexagonal => {
             let mut random = Random::new(scene.seed);
@@ -81,6 +94,25 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
         });
     }
     Ok(packing)
+}
+
+/// The place of a point of the box along Morton's curve through 2¹⁶ × 2¹⁶ squares: the bits of the square's column and
+/// row in turn.
+fn along_curve(p: Vec2, domain: Domain) -> u64 {
+    let spread = |x: f64, length: f64| {
+        let mut bits = u64::from((x / length * 65536.0) as u16); // saturates
+        for (shift, mask) in [
+            (8, 0x00ff_00ff),
+            (4, 0x0f0f_0f0f),
+            (2, 0x3333_3333),
+            (1, 0x5555_5555),
+        ] {
+            bits = (bits | (bits << shift)) & mask;
+        }
+        bits
+    };
+    let l = domain.lengths();
+    spread(p.x, l.x) | (spread(p.y, l.y) << 1)
 }
 
 fn make(domain: Domain, radii: Vec<f64>, positions: Vec<Vec2>) -> Result<Packing, SceneError> {

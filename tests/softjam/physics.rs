@@ -12,3 +12,4 @@ mod matrix;
 mod model;
 mod relaxation;
 mod stress;
+mod work;

@@ -29,6 +29,7 @@ pub struct SparseCholesky {
     symbolic: Option<Symbolic>,
     factor: Vec<f64>,
     order: Vec<(u32, f64)>,
+    analyses: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -69,6 +70,7 @@ impl SparseCholesky {
             .symbolic
             .take()
             .filter(|s| s.pointers == self.pointers && s.rows == self.rows);
+        let stands = known.is_some();
         let symbolic = match known {
             Some(symbolic) => symbolic,
             None => Symbolic {
@@ -88,6 +90,7 @@ impl SparseCholesky {
                 ),
             },
         };
+        self.analyses += u64::from(!stands);
         let factorization = std::sync::Arc::clone(&symbolic.factorization);
         self.symbolic = Some(symbolic);
         self.factor.clear();
@@ -120,6 +123,11 @@ impl SparseCholesky {
             Some(contact) => Err(failed(contact)),
             None => Ok(()),
         }
+    }
+
+    /// How often a pattern was analysed.
+    pub(crate) fn symbolic_factorizations(&self) -> u64 {
+        self.analyses
     }
 
     fn lower_triangle(&mut self, matrix: &ContactMatrix) {

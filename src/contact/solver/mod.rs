@@ -137,4 +137,36 @@ impl LinearSolver {
             Self::GaussJordan(dense) => dense.solve(matrix, overlaps, forces).map(|()| 0),
         }
     }
+
+    /// [`solve`](Self::solve) to a tolerance far above round-off.
+    pub(crate) fn solve_loosely(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        tolerance: f64,
+    ) -> Result<usize, SolverError> {
+        match self {
+            Self::ConjugateGradient(cg) => cg.solve_loosely(matrix, overlaps, forces, tolerance),
+            Self::SparseCholesky(_) | Self::GaussJordan(_) => {
+                self.solve(matrix, overlaps, forces, tolerance)
+            }
+        }
+    }
+
+    /// `max |A f − δ|` of the last solution (length), where the solver knows it.
+    pub(crate) fn largest_residual(&self) -> Option<f64> {
+        match self {
+            Self::ConjugateGradient(cg) => Some(cg.largest_residual()),
+            Self::SparseCholesky(_) | Self::GaussJordan(_) => None,
+        }
+    }
+
+    /// How often a pattern was analysed.
+    pub(crate) fn symbolic_factorizations(&self) -> u64 {
+        match self {
+            Self::SparseCholesky(cholesky) => cholesky.symbolic_factorizations(),
+            Self::ConjugateGradient(_) | Self::GaussJordan(_) => 0,
+        }
+    }
 }

@@ -1,0 +1,195 @@
+//! What is not needed is not computed: counts of work, not of seconds.
+
+use crate::common::{Folder, assert_at_most, converged, scene};
+use softjam::contact::solver::Method;
+use softjam::contact::{ContactLaw, Work};
+use softjam::packing::Packing;
+use softjam::relax::{Relaxation, Status};
+use softjam::scene::{Scene, Start};
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+
+/// Works off a run; `seen` is told the step's work and whether the contacts are those of the step before.
+fn walk(scene: &Scene, mut seen: impl FnMut(&Relaxation, Work, bool)) -> Relaxation {
+    let mut run = Relaxation::new(scene).unwrap();
+    while run.status() == Status::Running {
+        let (before, pairs) = (run.law().work(), run.contacts().pairs.to_vec());
+        run.advance().unwrap();
+        let after = run.law().work();
+        let step = Work {
+            solves: after.solves - before.solves,
+            sweeps: after.sweeps - before.sweeps,
+            iterations: after.iterations - before.iterations,
+            assemblies: after.assemblies - before.assemblies,
+            structures: after.structures - before.structures,
+            symbolic: after.symbolic - before.symbolic,
+            distances: after.distances - before.distances,
+            gaps: after.gaps - before.gaps,
+            neighbor_lists: after.neighbor_lists - before.neighbor_lists,
+        };
+        seen(&run, step, pairs == run.contacts().pairs);
+    }
+    run
+}
+
+#[test]
+fn structure_is_built_only_when_the_contacts_change() {
+    let (mut steady, mut tightened) = (0, 0);
+    let run = walk(&scene(256, 0.86, 2), |_, work, same| {
+        assert_eq!(work.solves, 1);
+        if work.structures == 0 {
+            assert!(same, "other contacts, but no other structure");
+            assert_eq!(work.assemblies, 1, "positions are taken over once a step");
+            steady += 1;
+            tightened += u64::from(work.sweeps > 1);
+        } else {
+            assert_eq!(work.assemblies, 1, "an exchange takes over what stays");
+            assert!(work.sweeps >= 2, "an exchange is followed by a solution");
+        }
+    });
+    println!(
+        "{steady} of {} steps without, {tightened} solved on",
+        run.step()
+    );
+    assert!(steady as f64 > 0.75 * run.step() as f64);
+    // The first set is found from nothing; afterwards one structure an exchange.
+    let work = run.law().work();
+    assert!(work.structures <= 1 + work.sweeps - work.solves);
+}
+
+#[test]
+fn forces_far_from_balance_take_few_iterations() {
+    // Measured: 4.6 to 5.6 a step; 20 to 40 with the full tolerance.
+    for (particles, phi) in [(256, 0.86), (256, 0.95), (1024, 0.86)] {
+        let (mut iterations, mut steps) = (0, 0);
+        let scene = Scene {
+            threshold: 1e-5,
+            ..scene(particles, phi, 1)
+        };
+        walk(&scene, |_, work, _| {
+            iterations += work.iterations;
+            steps += 1;
+        });
+        assert_at_most(
+            &format!("N = {particles}, phi {phi}: iterations a step"),
+            iterations as f64 / f64::from(steps),
+            7.0,
+        );
+    }
+}
+
+#[test]
+fn frames_keep_the_residual_that_they_promise_and_the_last_the_full_tolerance() {
+    for (phi, seed) in [(0.845, 3), (0.9, 4), (1.0, 5)] {
+        let mut loose = 0;
+        let run = walk(&scene(128, phi, seed), |run, _, _| {
+            assert!(run.law().residual() <= run.promised_residual());
+            loose += u64::from(run.law().residual() > run.law().accepted_residual());
+        });
+        assert_eq!(run.status(), Status::Converged);
+        assert!(run.law().residual() <= 1.6e-11);
+        assert!(loose > run.step() / 2, "{loose} of {} frames", run.step());
+    }
+}
+
+/// The pairs whose bulges could bridge the distance between them, by the bound `R (0.640 76 Σ f)/2π` of each bulge.
+fn pairs_in_reach(packing: &Packing, law: &ContactLaw) -> u64 {
+    let mut reach = packing.radii().to_vec();
+    for (&[i, j], f) in law.contacts().pairs.iter().zip(law.contacts().forces) {
+        for p in [i as usize, j as usize] {
+            reach[p] += packing.radii()[p] * 0.640_76 * f / (2.0 * PI);
+        }
+    }
+    let n = packing.len();
+    let near = |i: usize, j: usize| packing.separation(i, j).norm() < reach[i] + reach[j];
+    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+    pairs.filter(|&(i, j)| near(i, j)).count() as u64
+}
+
+#[test]
+fn gaps_are_computed_of_pairs_that_could_touch_and_of_no_other() {
+    for (phi, seed) in [(0.86, 1), (0.95, 2)] {
+        let run = converged(&scene(256, phi, seed));
+        let mut law = run.law().clone();
+        let before = law.work();
+        law.solve_again(run.packing()).unwrap();
+        let work = law.work();
+        assert_eq!(work.sweeps - before.sweeps, 1);
+        assert_eq!(work.iterations, before.iterations, "the answer is known");
+        let contacts = law.contacts().pairs.len() as u64;
+        assert_eq!(
+            work.gaps - before.gaps + contacts,
+            pairs_in_reach(run.packing(), &law)
+        );
+        // Distances only of what the neighbour list holds besides: about one a particle.
+        let distances = (work.distances - before.distances) as f64 / 256.0;
+        assert_at_most(&format!("phi {phi}: distances a particle"), distances, 2.0);
+    }
+}
+
+#[test]
+fn neighbour_list_serves_many_steps() {
+    let run = converged(&scene(256, 0.86, 3));
+    let lists = run.law().work().neighbor_lists;
+    println!("{lists} lists in {} steps", run.step());
+    assert!(
+        100 * lists <= run.step(),
+        "{lists} lists in {} steps",
+        run.step()
+    );
+}
+
+#[test]
+fn symbolic_factorisation_is_made_by_the_cholesky_alone_and_once_a_structure() {
+    for contact_solver in [Method::ConjugateGradient, Method::SparseCholesky] {
+        let run = converged(&Scene {
+            contact_solver,
+            ..scene(64, 0.9, 1)
+        });
+        let work = run.law().work();
+        match contact_solver {
+            Method::SparseCholesky => {
+                assert!(work.symbolic > 0 && work.symbolic <= work.structures);
+                assert!(work.structures < work.sweeps);
+            }
+            _ => assert_eq!(work.symbolic, 0),
+        }
+    }
+}
+
+#[test]
+fn run_that_starts_from_a_file_or_a_frame_relaxes_no_disks() {
+    let first = converged(&scene(48, 0.9, 1));
+    let folder = Folder::new();
+    let l = first.packing().domain().lengths();
+    let mut text = format!("# box = {}, {}\nx,y,radius\n", l.x, l.y);
+    for (p, radius) in first
+        .packing()
+        .positions()
+        .iter()
+        .zip(first.packing().radii())
+    {
+        writeln!(text, "{},{},{radius}", p.x, p.y).unwrap();
+    }
+    let path = folder.path().join("start.csv");
+    std::fs::write(&path, text).unwrap();
+    let from_file = Relaxation::new(&Scene {
+        start: Start::File {
+            path: path.to_str().unwrap().to_owned(),
+            blake3: None,
+        },
+        ..Scene::default()
+    })
+    .unwrap();
+    assert_eq!(from_file.disks(), None);
+    assert_eq!(from_file.status(), Status::Converged, "nothing was moved");
+    let resumed =
+        Relaxation::resume(&scene(48, 0.9, 1), first.packing().clone(), first.frame()).unwrap();
+    assert_eq!(resumed.disks(), None);
+    let work = resumed.law().work();
+    assert_eq!(
+        (work.solves, work.iterations),
+        (0, 0),
+        "the forces are in the frame"
+    );
+}
