@@ -193,7 +193,7 @@ pub struct Bars {
     pub title: String,
     pub label: String,
     pub most: f64,
-    pub bars: Vec<(String, f64, String)>,
+    pub rows: Vec<(String, f64, String)>,
     /// A vertical line, and what it says.
     pub limit: Option<(f64, String)>,
 }
@@ -203,7 +203,7 @@ impl Bars {
         let (left, top, width, height) = AREA;
         let mut s = title(&self.title);
         let x = |value: f64| left + width * value / self.most;
-        let pitch = height / self.bars.len().max(1) as f64;
+        let pitch = height / self.rows.len().max(1) as f64;
         let (mut tick, every) = (0.0, if self.most > 4.0 { 2.0 } else { 0.5 });
         while tick <= self.most {
             text(
@@ -215,7 +215,7 @@ impl Bars {
             line(&mut s, (x(tick), top), (x(tick), top + height), GRID);
             tick += every;
         }
-        for (k, (name, value, remark)) in self.bars.iter().enumerate() {
+        for (k, (name, value, remark)) in self.rows.iter().enumerate() {
             let y = top + pitch * (k as f64 + 0.16);
             let _ = write!(
                 s,

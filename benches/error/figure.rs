@@ -283,7 +283,7 @@ fn recording(table: &Table) -> String {
             .iter()
             .fold(1.5, |m: f64, b| m.max((2.0 * b.1).ceil() / 2.0)),
         limit: None,
-        bars,
+        rows: bars,
     }
     .svg()
 }

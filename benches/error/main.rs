@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 out = arguments
                     .next()
                     .map(PathBuf::from)
-                    .ok_or("--out needs a folder")?
+                    .ok_or("--out needs a folder")?;
             }
             name if name == "figure" || ITEMS.iter().any(|i| i.0 == name) => items.push(argument),
             other => return Err(format!("no item is called {other}").into()),

@@ -72,12 +72,9 @@ fn variant(
         let lines = format!(
             "particles = {particles}\nphi = {phi}\nseed = {seed}\nthreshold = 1e-13\nsteps = 30000\n{lines}"
         );
-        let mut scene = match Scene::from_toml(&lines) {
-            Ok(scene) => scene,
-            Err(_) => {
-                eprintln!("  {name}: this version has no such scene");
-                return Ok(());
-            }
+        let Ok(mut scene) = Scene::from_toml(&lines) else {
+            eprintln!("  {name}: this version has no such scene");
+            return Ok(());
         };
         let clock = Instant::now();
         let mut packing = start::packing(&scene)?;

@@ -107,7 +107,12 @@ fn ended(scene: &Scene, run: &Relaxation, status: Status) -> Outcome {
     let converged = status == Status::Converged;
     // Sixteen tolerances is what the law promises; as much again for this other way to compute it. Away from balance forces need
     // only be exact to a hundredth of f_max: f_max (3/2π) R_min / 100 as a length, and 1e-4 of the overlaps at most.
-    let least = run.packing().radii().iter().copied().fold(f64::INFINITY, f64::min);
+    let least = run
+        .packing()
+        .radii()
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
     let loose = (0.01 * c.f_max * 1.5 / PI * least).min(1e-4 * c.overlap);
     let due = if converged { 0.0 } else { loose };
     let law = 32.0 * due.max(scene.contact_tolerance * c.overlap) + c.round_off;

@@ -18,9 +18,11 @@
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
+use super::error::ContactError;
 use super::geometry::Kept;
 use super::images::second_image;
-use super::law::{ACCEPTED, ContactError, ContactLaw};
+use super::law::ContactLaw;
+use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
 use core::f64::consts::PI;
@@ -317,11 +319,11 @@ impl ContactLaw {
         for offence in &self.offending[..count.min(FEW)] {
             let pair = offence.pair();
             match (offence, self.others.binary_search(&pair)) {
-                (Offence::Drop(..), Err(place)) => {
-                    // Only what the neighbour list holds.
-                    if self.neighbors.pairs().binary_search(&pair).is_ok() {
-                        self.others.insert(place, pair);
-                    }
+                // Only what the neighbour list holds.
+                (Offence::Drop(..), Err(place))
+                    if self.neighbors.pairs().binary_search(&pair).is_ok() =>
+                {
+                    self.others.insert(place, pair);
                 }
                 (Offence::Add(..), Ok(place)) => {
                     self.others.remove(place);

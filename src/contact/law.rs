@@ -2,13 +2,14 @@
 
 use super::Contacts;
 use super::complementarity::Offence;
+use super::error::ContactError;
 use super::geometry::Kept;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
-use super::solver::{LinearSolver, Method, SolverError};
+use super::solver::{LinearSolver, Method};
+use super::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
-use core::f64::consts::PI;
 
 /// How the contact list follows the positions.
 ///
@@ -25,55 +26,6 @@ pub enum Rule {
     /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
     /// exceed the solver's tolerance.)
     Seed,
-}
-
-/// Why the contact problem has no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ContactError {
-    /// `A f = δ` was not solved.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// A particle touches two images of the same neighbour, or of itself.
-    #[error(
-        "particle {particle} touches particle {other} across more than one side of the box, whose shorter side is \
-         {shortest:.4} (it reaches up to {reach:.4}); take more particles or a lower phi"
-    )]
-    BoxTooSmall {
-        /// The particle.
-        particle: usize,
-        /// The particle of which it touches two images; itself where it touches its own.
-        other: usize,
-        /// Undeformed radius of the first and the bound of its bulge (length).
-        reach: f64,
-        /// The shorter side of the box (length).
-        shortest: f64,
-    },
-    /// The forces are so large that a contour would bulge by several radii.
-    #[error(
-        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces are absurd, \
-         as after a step that was too long or in a start that overlaps far too much"
-    )]
-    Absurd {
-        /// The particle.
-        particle: usize,
-        /// The bound of its bulge (length).
-        bulge: f64,
-        /// Its undeformed radius (length).
-        radius: f64,
-    },
-    /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
-    #[error(
-        "the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps"
-    )]
-    Unsettled {
-        /// Pairs that still break the law.
-        offending: usize,
-        /// Contacts in the set.
-        contacts: usize,
-        /// Sweeps done.
-        sweeps: usize,
-    },
 }
 
 /// The contact law: a solver of the contact problem with its settings, its buffers and its last answer.
@@ -118,7 +70,7 @@ pub struct ContactLaw {
     /// The neighbour list without `pairs`, and whether it is up to date.
     pub(super) others: Vec<[u32; 2]>,
     pub(super) parted: bool,
-    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`].
+    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
     pub(super) bulges: Vec<f64>,
@@ -400,7 +352,7 @@ impl ContactLaw {
     }
 
     /// The tolerance that is due in a frame whose largest net force is `f_max` (units of γ), with the contacts found last;
-    /// see [`due_tolerance`].
+    /// see [`due_tolerance`](super::due_tolerance).
     ///
     /// ```
     /// # use softjam::{relax::Relaxation, scene::Scene};
@@ -424,53 +376,48 @@ impl ContactLaw {
     }
 }
 
-/// The tolerance of the contact forces that is due in a frame, relative to its `max |δ|` (`overlaps`, length): a function
-/// of the frame alone. `tolerance` is the scene's, `f_max` the frame's (units of γ).
-///
-/// Far from balance there is no use in forces that are more exact than they are balanced. The residual `|A f − δ|` may be
-/// as large as what changes the force of the stiffest contact on its own by a hundredth of `f_max`:
-///
-/// ```text
-/// max(tolerance, min(10⁻⁴, 10⁻² f_max (3/2π) R_min / max |δ|))
-/// ```
-///
-/// A frame whose `f_max` is not above the scene's threshold is solved to the full tolerance in any case, which is this
-/// function at `f_max = 0`.
-///
-/// ```
-/// use softjam::contact::due_tolerance;
-/// use softjam::domain::{Domain, Vec2};
-/// use softjam::packing::Packing;
-///
-/// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-/// assert_eq!(due_tolerance(&packing, &[0.1], 0.0, 1e-12), 1e-12);
-/// let due = due_tolerance(&packing, &[0.1], 1e-4, 1e-12);
-/// assert!((due - 1e-6 * 0.75 / std::f64::consts::PI / 0.1).abs() < 1e-20);
-/// ```
-#[must_use]
-pub fn due_tolerance(packing: &Packing, overlaps: &[f64], f_max: f64, tolerance: f64) -> f64 {
-    let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-    relative_tolerance(tolerance, slack(packing, f_max), scale)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{Domain, Vec2};
 
-/// How many tolerances a residual may have: see [`ContactLaw::accepted_residual`].
-pub(crate) const ACCEPTED: f64 = 16.0;
+    /// Where each buffer is, and how long it may get without moving.
+    fn buffers(law: &ContactLaw) -> [(usize, usize); 6] {
+        fn of<T>(v: &Vec<T>) -> (usize, usize) {
+            (v.as_ptr() as usize, v.capacity())
+        }
+        [
+            of(&law.pairs),
+            of(&law.forces),
+            of(&law.others),
+            of(&law.offending),
+            of(&law.bulges),
+            of(&law.kept),
+        ]
+    }
 
-/// The error of a contact force that is allowed far from balance, as a part of the largest net force.
-///
-/// Measured at N = 1024, φ = 0.86: 1e-3 takes two to three iterations more a step and as many steps; with 1e-1 FIRE takes
-/// three times the steps.
-pub(crate) const FORCE_ERROR: f64 = 1e-2;
-
-/// The largest tolerance far from balance, relative to the largest `|δ|`.
-pub(crate) const LOOSEST: f64 = 1e-4;
-
-/// `FORCE_ERROR f_max (3/2π) R_min`: what changes the force of the stiffest contact by that part of `f_max` (length).
-fn slack(packing: &Packing, f_max: f64) -> f64 {
-    FORCE_ERROR * f_max * (1.5 / PI) * packing.smallest_radius()
-}
-
-fn relative_tolerance(tolerance: f64, slack: f64, scale: f64) -> f64 {
-    let loose = if scale > 0.0 { slack / scale } else { 0.0 };
-    tolerance.max(loose.min(LOOSEST))
+    #[test]
+    fn a_solution_with_the_same_contacts_moves_no_buffer() {
+        let side = 6.0;
+        let mut points = Vec::new();
+        for k in 0..36 {
+            points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
+        }
+        let packing = |shift: f64| {
+            let mut points = points.clone();
+            for (k, p) in points.iter_mut().enumerate() {
+                p.x += shift * (k as f64).sqrt();
+            }
+            Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
+        };
+        let mut law = ContactLaw::default();
+        law.solve(&packing(0.0), &[], &[]).unwrap();
+        law.solve_again(&packing(1e-4)).unwrap();
+        let (before, structures) = (buffers(&law), law.work().structures);
+        for k in 2..50 {
+            law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
+        }
+        assert_eq!(law.work().structures, structures, "the same contacts");
+        assert_eq!(buffers(&law), before);
+    }
 }

@@ -21,15 +21,19 @@
 //! added behind it.
 
 pub mod complementarity;
+mod error;
 mod geometry;
 mod images;
 mod law;
 pub mod list;
 pub mod matrix;
 pub mod solver;
+mod tolerance;
 
-pub(crate) use law::ACCEPTED;
-pub use law::{ContactError, ContactLaw, Rule, Work, due_tolerance};
+pub use error::ContactError;
+pub use law::{ContactLaw, Rule, Work};
+pub(crate) use tolerance::ACCEPTED;
+pub use tolerance::due_tolerance;
 
 use crate::domain::Vec2;
 use crate::frame::Frame;

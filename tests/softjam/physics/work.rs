@@ -34,7 +34,7 @@ fn walk(scene: &Scene, mut seen: impl FnMut(&Relaxation, Work, bool)) -> Relaxat
 
 #[test]
 fn structure_is_built_only_when_the_contacts_change() {
-    let (mut steady, mut tightened) = (0, 0);
+    let (mut steady, mut tightened) = (0u64, 0);
     let run = walk(&scene(256, 0.86, 2), |_, work, same| {
         assert_eq!(work.solves, 1);
         if work.structures == 0 {
@@ -61,7 +61,7 @@ fn structure_is_built_only_when_the_contacts_change() {
 fn forces_far_from_balance_take_few_iterations() {
     // Measured: 4.6 to 5.6 a step; 20 to 40 with the full tolerance.
     for (particles, phi) in [(256, 0.86), (256, 0.95), (1024, 0.86)] {
-        let (mut iterations, mut steps) = (0, 0);
+        let (mut iterations, mut steps) = (0u64, 0u32);
         let scene = Scene {
             threshold: 1e-5,
             ..scene(particles, phi, 1)
