@@ -6,6 +6,28 @@
 use crate::contact::Contacts;
 use crate::domain::{Domain, Vec2};
 
+/// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
+///
+/// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
+///
+/// ```
+/// assert_eq!(softjam::force::METRICS.len(), 9);
+/// ```
+pub const METRICS: [&str; 9] = [
+    "f_max",
+    "log10_f_max",
+    "energy",
+    "pressure",
+    "coordination",
+    "contacts",
+    "rattlers",
+    "dt",
+    "stress_xy",
+];
+
+/// The values of [`METRICS`].
+pub type Metrics = [f64; METRICS.len()];
+
 /// Net forces of the contacts on each particle, `F_i = Σ_j f_ij n_ij` (force), summed in the order of the contact list.
 ///
 /// # Panics
@@ -161,27 +183,26 @@ impl Observables {
         o
     }
 
-    /// The metrics as they are recorded, by name: one scalar each under `/metrics/`.
-    ///
-    /// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
+    /// The metrics as they are recorded, in the order of [`METRICS`].
     ///
     /// ```
-    /// # use softjam::force::Observables;
-    /// let names = Observables::default().metrics().map(|(name, _)| name);
-    /// assert_eq!(names[..3], ["f_max", "log10_f_max", "energy"]);
+    /// # use softjam::force::{METRICS, Observables};
+    /// let metrics = Observables { f_max: 0.01, ..Observables::default() }.metrics();
+    /// assert_eq!(METRICS[..2], ["f_max", "log10_f_max"]);
+    /// assert_eq!(metrics[..2], [0.01, -2.0]);
     /// ```
     #[must_use]
-    pub fn metrics(&self) -> [(&'static str, f64); 9] {
+    pub fn metrics(&self) -> Metrics {
         [
-            ("f_max", self.f_max),
-            ("log10_f_max", libm::log10(self.f_max.max(1e-18))),
-            ("energy", self.energy),
-            ("pressure", self.pressure()),
-            ("coordination", self.coordination()),
-            ("contacts", self.contacts as f64),
-            ("rattlers", self.rattlers as f64),
-            ("dt", self.dt),
-            ("stress_xy", self.stress[1]),
+            self.f_max,
+            libm::log10(self.f_max.max(1e-18)),
+            self.energy,
+            self.pressure(),
+            self.coordination(),
+            self.contacts as f64,
+            self.rattlers as f64,
+            self.dt,
+            self.stress[1],
         ]
     }
 
@@ -241,6 +262,30 @@ pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
 /// ```
 #[must_use]
 pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
+    let (numbers, contacts) = held_contacts(particles, pairs);
+    (numbers.iter().filter(|n| **n < 3).count(), contacts)
+}
+
+/// Which particles are held by their contacts, that is, which are no rattlers; see [`backbone`].
+///
+/// # Panics
+///
+/// If a pair names a particle that is not there.
+///
+/// ```
+/// use softjam::force::held;
+///
+/// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
+/// assert_eq!(held(5, &pairs), [true, true, true, true, false]);
+/// ```
+#[must_use]
+pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
+    let (numbers, _) = held_contacts(particles, pairs);
+    numbers.iter().map(|n| *n >= 3).collect()
+}
+
+/// The number of contacts of each particle with others that are held, and the number of contacts between such.
+fn held_contacts(particles: usize, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
     let mut contacts = vec![0u32; particles];
     for p in pairs.iter().flatten() {
         contacts[*p as usize] += 1;
@@ -258,8 +303,7 @@ pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
             held
         });
         if left.len() == before {
-            let rattlers = contacts.iter().filter(|n| **n < 3).count();
-            return (rattlers, left.len());
+            return (contacts, left.len());
         }
     }
 }

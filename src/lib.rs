@@ -55,8 +55,14 @@
 //! | [`force`] | net forces, energy, stress, coordination |
 //! | [`relax`] | FIRE and the loop that yields frames |
 //! | [`frame`] | a frame and its digest |
-#![cfg_attr(feature = "rrd", doc = "| [`record`] | recordings |")]
-#![cfg_attr(feature = "rrd", doc = "| [`replay`] | reading them back |")]
+#![cfg_attr(
+    feature = "recording",
+    doc = "| [`record`] | recordings, `.rrd` and `.mcap` |\n| [`replay`] | reading them back, checking them |\n| [`convert`] | from one format to the other, with more channels or fewer |"
+)]
+#![cfg_attr(
+    feature = "figure",
+    doc = "| [`figure`] | figures of packings and relaxations |"
+)]
 //!
 //! # Reproducibility
 //!
@@ -64,16 +70,20 @@
 //! sums have one order, random numbers come from a named generator. A frame determines the next one.
 
 pub mod contact;
+#[cfg(feature = "recording")]
+pub mod convert;
 pub mod disks;
 pub mod domain;
 pub mod droplet;
+#[cfg(feature = "figure")]
+pub mod figure;
 pub mod force;
 pub mod frame;
 pub mod neighbors;
 pub mod packing;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 pub mod record;
 pub mod relax;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 pub mod replay;
 pub mod scene;

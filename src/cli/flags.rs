@@ -59,6 +59,17 @@ pub struct SceneFlags {
     #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::contact::solver::Method>, help_heading = RELAXATION)]
     contact_solver: Option<softjam::contact::solver::Method>,
 
+    #[command(flatten)]
+    channels: ChannelFlags,
+
+    /// Vertices of a contour, beside those on the contacts.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = RECORDING)]
+    vertices: Option<usize>,
+}
+
+/// The flags that say what a recording holds.
+#[derive(Args)]
+pub struct ChannelFlags {
     /// What to record: a list of contours, contacts, metrics, state, each as it is scheduled in the scene or with a
     /// schedule of its own, as in `metrics,state=every:10,contours=log:20`; what is not named is off.
     #[arg(long, value_name = "LIST", value_parser = channel_list, help_heading = RECORDING)]
@@ -68,10 +79,6 @@ pub struct SceneFlags {
     /// and keep theirs).
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = RECORDING)]
     every: Option<i64>,
-
-    /// Vertices of a contour, beside those on the contacts.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = RECORDING)]
-    vertices: Option<usize>,
 }
 
 const PACKING: &str = "Packing";
@@ -107,7 +114,7 @@ impl SceneFlags {
 
     /// The scene of these fields, overridden by the flags.
     pub fn scene_over(&self, file: SceneFields) -> anyhow::Result<Scene> {
-        let channels = self.channels(file.channels.unwrap_or_default())?;
+        let channels = self.channels.over(file.channels.unwrap_or_default())?;
         let contours = self.vertices.map(|vertices| {
             let mut style = file.contours.unwrap_or_default();
             style.vertices = vertices;
@@ -132,8 +139,11 @@ impl SceneFlags {
         };
         Ok(file.overridden_by(flags).into_scene()?)
     }
+}
 
-    fn channels(&self, scheduled: Channels) -> Result<Option<Channels>, SceneError> {
+impl ChannelFlags {
+    /// The channels of `scheduled` as the flags change them; `None` if no flag does.
+    pub fn over(&self, scheduled: Channels) -> Result<Option<Channels>, SceneError> {
         let mut channels = scheduled;
         if let Some(list) = &self.channels {
             channels = Channels {
@@ -181,7 +191,7 @@ fn channel(channels: &mut Channels, k: usize) -> &mut Schedule {
 }
 
 /// A unit variant by its name in the scene file.
-fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+pub fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(text);
     T::deserialize(value).map_err(|e| e.to_string())
 }

@@ -28,7 +28,7 @@ struct Findings {
     /// Recorded steps of each channel: how many, the first and the last.
     channels: BTreeMap<String, (u64, u64, u64)>,
     /// The last value of each metric.
-    metrics: BTreeMap<String, f64>,
+    metrics: BTreeMap<&'static str, f64>,
     /// Step and digest of the last state.
     last: Option<(u64, [u8; 32])>,
     result: Option<Outcome>,
@@ -45,7 +45,9 @@ impl Findings {
                     ("state", frame.step)
                 }
                 Ok(Event::Drawn { channel, step }) => (channel, step),
-                Ok(Event::Metric { name, step, value }) => {
+                Ok(Event::Metric {
+                    name, step, value, ..
+                }) => {
                     let first_seen = name == "f_max";
                     found.metrics.insert(name, value);
                     if !first_seen {

@@ -2,13 +2,18 @@
 //!
 //! Results go to standard output, diagnostics and the progress bar to standard error.
 
+mod convert;
+mod figure;
 mod flags;
 mod info;
+mod output;
 mod record;
 mod replay;
 mod scene;
 
 use clap::{Parser, Subcommand};
+use softjam::convert::ConvertError;
+use softjam::figure::FigureError;
 use softjam::record::RecordError;
 use softjam::relax::RelaxError;
 use softjam::scene::SceneError;
@@ -38,6 +43,10 @@ enum Verb {
     Replay(replay::Arguments),
     /// Say what a recording holds.
     Info(info::Arguments),
+    /// Convert a recording: .rrd ⇄ .mcap, with more channels or fewer.
+    Convert(convert::Arguments),
+    /// Draw a packing, or the fall of f_max, as SVG or PNG.
+    Figure(figure::Arguments),
     /// Print a scene file: the default one, or a file and flags with every field filled in.
     Scene(scene::Arguments),
 }
@@ -63,6 +72,8 @@ pub fn run() -> ExitCode {
         Verb::Record(arguments) => record::run(&arguments),
         Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
+        Verb::Convert(arguments) => convert::run(&arguments),
+        Verb::Figure(arguments) => figure::run(&arguments),
         Verb::Scene(arguments) => scene::run(&arguments),
     };
     match result {
@@ -98,12 +109,25 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if let Some(e) = error.downcast_ref::<SceneError>() {
         return scene(e);
     }
+    if let Some(ConvertError::NoState { .. }) = error.downcast_ref::<ConvertError>() {
+        return 2;
+    }
+    if let Some(FigureError::Name { .. } | FigureError::Nothing(_)) =
+        error.downcast_ref::<FigureError>()
+    {
+        return 2;
+    }
     match (
         error.downcast_ref::<RelaxError>(),
         error.downcast_ref::<RecordError>(),
     ) {
         (Some(RelaxError::Scene(e)), _) => scene(e),
-        (_, Some(RecordError::Exists { .. } | RecordError::Input { .. })) => 2,
+        (
+            _,
+            Some(
+                RecordError::Exists { .. } | RecordError::Input { .. } | RecordError::Twice { .. },
+            ),
+        ) => 2,
         _ => 1,
     }
 }

@@ -1,13 +1,14 @@
 //! `softjam record`: relaxes a scene and records it.
 
 use super::flags::{RECORDING, SceneFlags};
+use super::output::{Output, open_with, same};
 use super::{Verdict, print};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
-use softjam::record::{self, Header, RecordError, Summary, Writer};
+use softjam::record::{self, Format, Header, RecordError, Summary, Writer};
 use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Scene, SceneError, SceneFields, Start};
@@ -25,6 +26,7 @@ Examples:
   softjam record --particles 1024 --phi 0.9 --seed 7 -o run.rrd
   softjam record scene.toml --channels metrics,state -o small.rrd
   softjam record --from broken.rrd -o rest.rrd      finish a run that was interrupted
+  softjam record --mcap run.mcap                    for Foxglove; beside the .rrd with -o run.rrd
 Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd")]
 pub struct Arguments {
     #[command(flatten)]
@@ -46,9 +48,13 @@ pub struct Arguments {
     #[arg(long, value_name = "K", requires = "from", help_heading = "Continue")]
     step: Option<u64>,
 
-    /// File to record into.
-    #[arg(long, short, value_name = "RUN.rrd", default_value = "softjam.rrd", help_heading = RECORDING)]
-    output: PathBuf,
+    /// File to record into; a name that ends in .mcap gives MCAP. Without this and --mcap, softjam.rrd.
+    #[arg(long, short, value_name = "RUN.rrd", help_heading = RECORDING)]
+    output: Option<PathBuf>,
+
+    /// File to record into as MCAP, alone or beside the one of -o.
+    #[arg(long, value_name = "RUN.mcap", help_heading = RECORDING)]
+    mcap: Option<PathBuf>,
 
     /// Replace an existing file.
     #[arg(long, short, help_heading = RECORDING)]
@@ -62,7 +68,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     };
     let scene = origin.scene().clone();
     fits_in_memory(&scene)?;
-    can_be_written(arguments, &scene)?;
+    let outputs = outputs(arguments, &scene)?;
     if scene.threshold < scene.contact_tolerance {
         warn(&format!(
             "threshold = {:e} is below what contact_tolerance = {:e} resolves: the run may never converge",
@@ -77,19 +83,23 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         Origin::Frame(scene, packing, frame) => Relaxation::resume(&scene, packing, *frame)?,
     };
     let disks = start.elapsed();
-    let writer = Writer::create(&arguments.output, arguments.force, Header::of(&scene, &run))?;
+    let header = Header::of(&scene, &run);
+    let writers = outputs.iter().map(|output| {
+        Writer::create_as(output.format, &output.path, arguments.force, header.clone())
+    });
+    let writers = writers.collect::<Result<Vec<_>, _>>()?;
     phase.recording();
     let from = run.step();
     let bar = Progress::new(&scene, from);
     let start = Instant::now();
-    let recorded = record::record(&mut run, writer, &scene.channels, |run| {
+    let recorded = record::record(&mut run, writers, &scene.channels, |run| {
         bar.show(run, start);
         phase.goes_on()
     });
     bar.clear();
     let summary = recorded?;
     print(&report(
-        &arguments.output,
+        &outputs,
         &scene,
         &run,
         &summary,
@@ -107,42 +117,31 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     })
 }
 
-/// Before minutes are spent on a packing that could not be written.
-fn can_be_written(arguments: &Arguments, scene: &Scene) -> Result<(), RecordError> {
-    let output = &arguments.output;
-    let path = output.display().to_string();
-    let create = |kind: io::ErrorKind| RecordError::Create {
-        path: path.clone(),
-        source: kind.into(),
-    };
-    if output.is_dir() {
-        return Err(create(io::ErrorKind::IsADirectory));
+/// The files to write, which can be written.
+fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordError> {
+    let mut outputs: Vec<Output> = arguments.output.iter().map(|p| Output::named(p)).collect();
+    if let Some(path) = &arguments.mcap {
+        if outputs.iter().any(|other| same(&other.path, path)) {
+            let path = path.display().to_string();
+            return Err(RecordError::Twice { path });
+        }
+        outputs.push(Output {
+            path: path.clone(),
+            format: Format::Mcap,
+        });
     }
-    let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
-    if folder.is_some_and(|folder| !folder.is_dir()) {
-        return Err(create(io::ErrorKind::NotFound));
-    }
-    if !output.exists() {
-        return Ok(());
+    if outputs.is_empty() {
+        outputs.push(Output::named(Path::new("softjam.rrd")));
     }
     let start = match &scene.start {
         Start::File { path, .. } => Some(Path::new(path)),
         Start::Random | Start::Hexagonal => None,
     };
     let inputs = [arguments.from.as_deref(), start, arguments.scene.path()];
-    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    if inputs
-        .into_iter()
-        .flatten()
-        .any(|input| same(input, output))
-    {
-        return Err(RecordError::Input { path });
+    for output in &outputs {
+        output.check(&inputs, arguments.force)?;
     }
-    if arguments.force {
-        Ok(())
-    } else {
-        Err(RecordError::Exists { path })
-    }
+    Ok(outputs)
 }
 
 fn warn(text: &str) {
@@ -313,7 +312,7 @@ impl Progress {
 
 /// What a physicist wants to read at the end.
 fn report(
-    path: &Path,
+    outputs: &[Output],
     scene: &Scene,
     run: &Relaxation,
     summary: &Summary,
@@ -389,15 +388,17 @@ fn report(
             took.as_secs_f64()
         ),
     );
-    line(
-        "file",
-        format!(
-            "{} ({}, {} states)",
-            path.display(),
-            HumanBytes(summary.bytes),
-            summary.states
-        ),
-    );
-    line("open it with", format!("rerun {}", path.display()));
+    for (output, written) in outputs.iter().zip(&summary.files) {
+        line(
+            "file",
+            format!(
+                "{} ({}, {} states)",
+                output.path.display(),
+                HumanBytes(written.bytes),
+                written.states
+            ),
+        );
+        line("open it with", open_with(&output.path, output.format));
+    }
     text
 }

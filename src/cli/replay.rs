@@ -197,26 +197,35 @@ impl Findings {
             );
         }
         if let Some(b) = &self.balance {
-            let at = |w: &Worst| format!("{:.1e} (step {})", w.value, w.step);
+            // The contact problem is solved to what f_max makes sensible, so a frame far from balance is off by more.
+            let at = |w: &Worst| match w.value {
+                0.0 => "none".to_owned(),
+                value if w.allowed > 0.0 => format!(
+                    "{value:.1e} at step {} (allowed there: {:.1e})",
+                    w.step, w.allowed
+                ),
+                value => format!("{value:.1e} at step {}", w.step),
+            };
             line(
                 "equation (4)",
-                format!("{} of the largest overlap", at(&b.equation_4)),
+                format!(
+                    "{:.1e} of the largest overlap at the last state; {} at worst",
+                    b.last_equation_4,
+                    at(&b.equation_4)
+                ),
             );
-            line(
-                "gaps",
-                format!("deepest overlap elsewhere {}", at(&b.overlap)),
-            );
+            line("gaps", format!("overlap elsewhere: {}", at(&b.overlap)));
             line(
                 "forces",
                 format!(
-                    "against those found anew {} of the largest force",
+                    "against those found anew, of the largest force: {}",
                     at(&b.forces)
                 ),
             );
             line(
                 "observables",
                 format!(
-                    "energy and pressure {} relative",
+                    "energy and pressure, relative: {}",
                     at(&b.energy_and_pressure)
                 ),
             );
@@ -264,7 +273,7 @@ impl Findings {
     }
 
     fn json(&self, path: &Path) -> String {
-        let worst = |w: &Worst| serde_json::json!({ "value": w.value, "step": w.step });
+        let worst = |w: &Worst| serde_json::json!({ "value": w.value, "allowed": w.allowed, "step": w.step });
         let determinism = self.determinism.as_ref().map(|d| {
             serde_json::json!({
                 "states": d.states,
@@ -279,6 +288,7 @@ impl Findings {
             serde_json::json!({
                 "frames": b.frames,
                 "equation_4": worst(&b.equation_4),
+                "last_equation_4": b.last_equation_4,
                 "overlap": worst(&b.overlap),
                 "pull": worst(&b.pull),
                 "forces": worst(&b.forces),

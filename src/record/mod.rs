@@ -1,8 +1,9 @@
 //! Recordings: what a run looked like, for the rerun viewer, for a collaborator and for a replay.
 //!
 //! A run is recorded as a sequence of [`Snapshot`]s: a step, what is recorded of it, and nothing else. What no channel
-//! asks for is not computed. [`Writer`] encodes them on a thread of its own behind a bounded queue; when it fails, the
-//! next snapshot fails with it, so that a full disk ends the run instead of emptying it.
+//! asks for is not computed. A [`Recorder`] turns snapshots into a file: [`RrdRecorder`] for the rerun viewer,
+//! [`McapRecorder`] for Foxglove and everything else that reads MCAP. [`Writer`] runs one on a thread of its own behind a
+//! bounded queue; when it fails, the next snapshot fails with it, so that a full disk ends the run instead of emptying it.
 //!
 //! ```
 //! use softjam::{record, relax::Relaxation, scene::Scene};
@@ -11,25 +12,33 @@
 //! let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 //! let mut run = Relaxation::new(&scene).unwrap();
 //! let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-//! let summary = record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
-//! assert!(summary.bytes > 0);
+//! let summary = record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
+//! assert!(summary.files[0].bytes > 0);
 //! # std::fs::remove_file(&path).unwrap();
 //! ```
 
 mod blueprint;
 mod encode;
+mod mcap;
+pub(crate) mod messages;
 mod pictures;
 mod rrd;
+mod scene_update;
+mod sink;
 mod writer;
 
+pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
 pub use writer::{Writer, Written};
 
-use crate::force::Observables;
+use crate::force::Metrics;
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::{Channels, Scene};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
 
 /// The version of the recording's layout; a reader refuses newer ones.
 ///
@@ -104,10 +113,10 @@ impl Header {
 pub struct Snapshot {
     /// The step.
     pub step: u64,
-    /// Simulated time.
-    pub time: f64,
+    /// Simulated time in nanoseconds of its unit, rounded towards zero.
+    pub nanoseconds: i64,
     /// The metrics, if they are recorded.
-    pub metrics: Option<Observables>,
+    pub metrics: Option<Metrics>,
     /// The frame, if contours, contacts or state are recorded.
     pub frame: Option<Frame>,
     /// Whether contours are recorded.
@@ -119,26 +128,98 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// What `channels` ask for at the present step of `run`; `None` if that is nothing. The first and the `last` step
-    /// are recorded by every channel that is on.
+    /// What `channels` ask for at the present step of `run`; `None` if that is nothing. At an `edge`, the first or the last
+    /// step of a recording, every channel that is on records.
     ///
     /// See the example of [`Snapshot`].
     #[must_use]
-    pub fn of(run: &Relaxation, channels: &Channels, last: bool) -> Option<Self> {
+    pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
         let step = run.step();
-        let [contours, contacts, metrics, state] = channels
-            .named()
-            .map(|(_, schedule)| schedule.includes(step) || (last && schedule.is_on()));
+        let [contours, contacts, metrics, state] = channels.at(step, edge);
         let frame = contours || contacts || state;
         (frame || metrics).then(|| Self {
             step,
-            time: run.time(),
-            metrics: metrics.then(|| run.observables()),
+            nanoseconds: nanoseconds(run.time()),
+            metrics: metrics.then(|| run.observables().metrics()),
             frame: frame.then(|| run.frame()),
             contours,
             contacts,
             state,
         })
+    }
+}
+
+/// Simulated time as recordings have it.
+pub(crate) fn nanoseconds(time: f64) -> i64 {
+    (time * 1e9) as i64
+}
+
+/// Turns snapshots into a file of one format.
+///
+/// ```
+/// use softjam::{record::{Header, McapRecorder, Recorder, RrdRecorder}, relax::Relaxation, scene::Scene};
+///
+/// let scene = Scene { particles: 32, ..Scene::default() };
+/// let run = Relaxation::new(&scene).unwrap();
+/// let header = Header::of(&scene, &run);
+/// let (mut rrd, mut mcap) = (Vec::new(), Vec::new());
+/// let recorders: [Box<dyn Recorder + '_>; 2] = [
+///     Box::new(RrdRecorder::new(&mut rrd, header.clone()).unwrap()),
+///     Box::new(McapRecorder::new(&mut mcap, header).unwrap()),
+/// ];
+/// for mut recorder in recorders {
+///     let written = recorder.finish(None).unwrap();
+///     assert_eq!((written.states, written.bytes), (0, recorder.written()));
+/// }
+/// ```
+pub trait Recorder {
+    /// Takes a snapshot; snapshots come in ascending steps. It reaches the sink with its batch.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step that it holds in full.
+    fn record(&mut self, snapshot: &Snapshot) -> io::Result<()>;
+
+    /// The last step that the sink holds in full.
+    fn intact(&self) -> Option<u64>;
+
+    /// Bytes that the sink holds and that make sense on their own: what comes behind them is a torn end.
+    fn written(&self) -> u64;
+
+    /// Writes what is left and the outcome and closes the file. Without an outcome the recording is one of an
+    /// unfinished run.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the sink fails with.
+    fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written>;
+}
+
+/// A file format of recordings.
+///
+/// ```
+/// use softjam::record::Format;
+/// assert_eq!(Format::of("run.mcap"), Format::Mcap);
+/// assert_eq!(Format::of("run.rrd"), Format::Rrd);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// For the rerun viewer.
+    Rrd,
+    /// For Foxglove and whatever else reads MCAP.
+    Mcap,
+}
+
+impl Format {
+    /// The format of a file by its name: MCAP if it ends in `.mcap`, else rerun's.
+    ///
+    /// See the example of [`Format`].
+    #[must_use]
+    pub fn of(path: impl AsRef<Path>) -> Self {
+        match path.as_ref().extension() {
+            Some(extension) if extension.eq_ignore_ascii_case("mcap") => Self::Mcap,
+            _ => Self::Rrd,
+        }
     }
 }
 
@@ -161,14 +242,12 @@ pub struct Outcome {
 /// What a recorded run came to.
 ///
 /// See the example of the [module](self).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// How the run ended; `None` if it was interrupted.
     pub outcome: Option<Outcome>,
-    /// Size of the file (bytes).
-    pub bytes: u64,
-    /// Frames whose state was recorded.
-    pub states: u64,
+    /// What was written, a file each.
+    pub files: Vec<Written>,
 }
 
 /// Why a recording could not be made.
@@ -184,6 +263,12 @@ pub enum RecordError {
     /// The file is one that the run reads from.
     #[error("{path} is an input of this run; name another file with -o")]
     Input {
+        /// Path of the file.
+        path: String,
+    },
+    /// Two outputs are one file.
+    #[error("{path} is named twice; give each format a file of its own")]
+    Twice {
         /// Path of the file.
         path: String,
     },
@@ -222,28 +307,33 @@ fn recorded_up_to(intact: Option<u64>) -> String {
     }
 }
 
-/// Relaxes `run` to its end and records it; `watch` sees every step and ends the run by returning `false`.
+/// Relaxes `run` to its end and records it with each of `writers`; `watch` sees every step and ends the run by returning
+/// `false`.
 ///
 /// An interrupted run is closed as a readable recording that names no result.
 ///
 /// # Errors
 ///
-/// [`RecordError::Write`] at the step at which the file could not be written, [`RecordError::Run`] if the relaxation
-/// failed; the steps before it are then in the file.
+/// [`RecordError::Write`] at the step at which a file could not be written, [`RecordError::Run`] if the relaxation
+/// failed; the steps before it are then in the files.
 ///
 /// See the example of the [module](self).
 pub fn record(
     run: &mut Relaxation,
-    mut writer: Writer,
+    mut writers: Vec<Writer>,
     channels: &Channels,
     mut watch: impl FnMut(&Relaxation) -> bool,
 ) -> Result<Summary, RecordError> {
+    let first = run.step();
     loop {
         let status = run.status();
         let goes_on = watch(run);
         let last = status != Status::Running || !goes_on;
-        if let Some(snapshot) = Snapshot::of(run, channels, last) {
-            writer.send(snapshot)?;
+        if let Some(snapshot) = Snapshot::of(run, channels, last || run.step() == first) {
+            let snapshot = Arc::new(snapshot);
+            for writer in &mut writers {
+                writer.send(Arc::clone(&snapshot))?;
+            }
         }
         if last {
             let outcome = (status != Status::Running).then(|| Outcome {
@@ -251,16 +341,14 @@ pub fn record(
                 steps: run.step(),
                 f_max: run.f_max(),
             });
-            let written = writer.finish(outcome)?;
-            return Ok(Summary {
-                outcome,
-                bytes: written.bytes,
-                states: written.states,
-            });
+            // Every file is closed, whatever becomes of the others.
+            let closed: Vec<_> = writers.into_iter().map(|w| w.finish(outcome)).collect();
+            let files = closed.into_iter().collect::<Result<_, _>>()?;
+            return Ok(Summary { outcome, files });
         }
         if let Err(error) = run.advance() {
             // What was recorded before stays readable. Should closing fail as well, the first failure is the news.
-            drop(writer.finish(None));
+            drop(writers);
             return Err(error.into());
         }
     }

@@ -15,11 +15,14 @@
 //! steps are written together, the state last.
 
 use super::encode::Encoder;
-use super::pictures::{contact_strips, contour_strips};
-use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Snapshot, Written, blueprint, recording_id};
+use super::pictures::{Network, Rgb, particle_colors};
+use super::{
+    FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written, blueprint, recording_id,
+};
 use crate::contact::FrameContacts;
 use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
+use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use rerun::external::arrow::array::{
@@ -50,7 +53,7 @@ const BATCH_SPAN: u64 = 2048;
 /// Two runs of one scene give the same bytes:
 ///
 /// ```
-/// use softjam::{record::{Header, RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
+/// use softjam::{record::{Header, Recorder as _, RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let record = || {
@@ -97,8 +100,6 @@ struct Pending {
 /// A step, its simulated time in nanoseconds and its metrics.
 type MetricRow = (u64, i64, Metrics);
 
-type Metrics = [(&'static str, f64); 9];
-
 struct Row<T> {
     time: TimePoint,
     data: T,
@@ -132,40 +133,6 @@ impl<W: Write> RrdRecorder<W> {
         })
     }
 
-    /// Records a snapshot. It reaches the sink with its batch.
-    ///
-    /// # Errors
-    ///
-    /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step it holds in full.
-    ///
-    /// See the example of [`RrdRecorder`].
-    pub fn record(&mut self, snapshot: &Snapshot) -> io::Result<()> {
-        let nanoseconds = (snapshot.time * 1e9) as i64;
-        if let Some(o) = &snapshot.metrics {
-            self.pending
-                .metrics
-                .push((snapshot.step, nanoseconds, o.metrics()));
-            self.pending.bytes += size_of::<Metrics>();
-        }
-        if let Some(frame) = &snapshot.frame {
-            let time = TimePoint::default()
-                .with(Timeline::new_sequence("step"), snapshot.step as i64)
-                .with(Timeline::new_duration("sim_time"), nanoseconds);
-            self.record_frame(snapshot, frame, &time);
-        }
-        let pending = &mut self.pending;
-        pending.snapshots += 1;
-        pending.last = Some(snapshot.step);
-        let first = *pending.first.get_or_insert(snapshot.step);
-        if pending.bytes >= BATCH_BYTES
-            || pending.snapshots >= BATCH_SNAPSHOTS
-            || snapshot.step.saturating_sub(first) >= BATCH_SPAN
-        {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame, time: &TimePoint) {
         let row = |data| Row {
             time: time.clone(),
@@ -181,13 +148,14 @@ impl<W: Write> RrdRecorder<W> {
                     &contacts,
                     self.line_tension,
                 );
-                let strips = contour_strips(&self.contours, self.packing.radii(), &contacts);
+                let colors = particle_colors(self.packing.radii(), &contacts);
+                let strips = contour_strips(&self.contours, colors);
                 self.pending.contours.push(row(strips));
                 self.pending.bytes += 8 * self.contours.vertices();
             }
             if snapshot.contacts {
-                let strips = contact_strips(&frame.positions, self.packing.radii(), &contacts);
-                self.pending.contacts.push(row(strips));
+                let network = Network::of(&frame.positions, self.packing.radii(), &contacts);
+                self.pending.contacts.push(row(contact_strips(&network)));
                 self.pending.bytes += 24 * contacts.pairs.len();
             }
         }
@@ -235,15 +203,16 @@ impl<W: Write> RrdRecorder<W> {
 
     /// Metrics column by column: a row is too little data to be built by itself.
     fn write_metrics(&mut self, rows: &[MetricRow]) -> io::Result<()> {
-        let names = rows.first().map(|row| row.2.map(|(name, _)| name));
-        for (k, name) in names.into_iter().flatten().enumerate() {
+        if rows.is_empty() {
+            return Ok(());
+        }
+        for (k, name) in METRICS.into_iter().enumerate() {
             let timelines = [
                 TimeColumn::new_sequence("step", rows.iter().map(|r| r.0 as i64)),
                 TimeColumn::new_duration_nanos("sim_time", rows.iter().map(|r| r.1)),
             ];
-            let values: ArrayRef = Arc::new(Float64Array::from_iter_values(
-                rows.iter().map(|r| r.2[k].1),
-            ));
+            let values: ArrayRef =
+                Arc::new(Float64Array::from_iter_values(rows.iter().map(|r| r.2[k])));
             let item = Arc::new(Field::new("item", DataType::Float64, true));
             let lengths = core::iter::repeat_n(1, rows.len());
             let list = ListArray::new(item, OffsetBuffer::from_lengths(lengths), values, None);
@@ -265,44 +234,46 @@ impl<W: Write> RrdRecorder<W> {
         }
         Ok(())
     }
+}
 
-    /// The last step that the sink holds in full.
-    ///
-    /// ```
-    /// use softjam::{record::{Header, RrdRecorder}, relax::Relaxation, scene::Scene};
-    ///
-    /// let scene = Scene { particles: 32, ..Scene::default() };
-    /// let run = Relaxation::new(&scene).unwrap();
-    /// let recorder = RrdRecorder::new(Vec::new(), Header::of(&scene, &run)).unwrap();
-    /// assert_eq!(recorder.intact(), None);
-    /// ```
-    #[must_use]
-    pub fn intact(&self) -> Option<u64> {
+impl<W: Write> Recorder for RrdRecorder<W> {
+    /// Takes a snapshot, which reaches the sink with its batch.
+    fn record(&mut self, snapshot: &Snapshot) -> io::Result<()> {
+        let nanoseconds = snapshot.nanoseconds;
+        if let Some(metrics) = snapshot.metrics {
+            self.pending
+                .metrics
+                .push((snapshot.step, nanoseconds, metrics));
+            self.pending.bytes += size_of::<Metrics>();
+        }
+        if let Some(frame) = &snapshot.frame {
+            let time = TimePoint::default()
+                .with(Timeline::new_sequence("step"), snapshot.step as i64)
+                .with(Timeline::new_duration("sim_time"), nanoseconds);
+            self.record_frame(snapshot, frame, &time);
+        }
+        let pending = &mut self.pending;
+        pending.snapshots += 1;
+        pending.last = Some(snapshot.step);
+        let first = *pending.first.get_or_insert(snapshot.step);
+        if pending.bytes >= BATCH_BYTES
+            || pending.snapshots >= BATCH_SNAPSHOTS
+            || snapshot.step.saturating_sub(first) >= BATCH_SPAN
+        {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn intact(&self) -> Option<u64> {
         self.intact
     }
 
-    /// Bytes of the whole messages written so far.
-    ///
-    /// ```
-    /// # use softjam::{record::{Header, RrdRecorder}, relax::Relaxation, scene::Scene};
-    /// # let scene = Scene { particles: 32, ..Scene::default() };
-    /// # let run = Relaxation::new(&scene).unwrap();
-    /// # let recorder = RrdRecorder::new(Vec::new(), Header::of(&scene, &run)).unwrap();
-    /// assert!(recorder.written() > 0);
-    /// ```
-    #[must_use]
-    pub fn written(&self) -> u64 {
+    fn written(&self) -> u64 {
         self.encoder.written()
     }
 
-    /// Writes what is left, the outcome and the footer. Without an outcome the recording is one of an unfinished run.
-    ///
-    /// # Errors
-    ///
-    /// Whatever the sink fails with.
-    ///
-    /// See the example of [`RrdRecorder`].
-    pub fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written> {
+    fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written> {
         self.flush()?;
         if let Some(outcome) = outcome {
             let digest = *self.digests.finalize().as_bytes();
@@ -323,6 +294,38 @@ impl<W: Write> RrdRecorder<W> {
             states: self.states,
         })
     }
+}
+
+/// Closed polygons.
+fn contour_strips(contours: &Contours, colors: Vec<Rgb>) -> LineStrips2D {
+    let strips = (0..contours.len()).map(|p| {
+        let polygon = contours.polygon(p);
+        let closed = polygon.iter().chain(polygon.first());
+        closed
+            .map(|v| [v.x as f32, v.y as f32])
+            .collect::<Vec<[f32; 2]>>()
+    });
+    LineStrips2D::new(strips).with_colors(colors.into_iter().map(color))
+}
+
+/// A segment a contact, width and colour by its force.
+fn contact_strips(network: &Network) -> LineStrips2D {
+    let strips = network
+        .segments
+        .iter()
+        .map(|ends| ends.map(|v| [v.x as f32, v.y as f32]));
+    let widths = network
+        .relative
+        .iter()
+        .map(|&r| Radius::new_scene_units(network.half_width(r) as f32));
+    let colors = network.relative.iter().map(|&r| color(Network::color(r)));
+    LineStrips2D::new(strips)
+        .with_radii(widths)
+        .with_colors(colors)
+}
+
+fn color([r, g, b]: Rgb) -> Color {
+    Color::from_rgb(r, g, b)
 }
 
 fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {

@@ -1,9 +1,10 @@
 //! The thread that encodes and writes, behind a bounded queue.
 
-use super::{Header, Outcome, RecordError, RrdRecorder, Snapshot};
+use super::{Format, Header, McapRecorder, Outcome, RecordError, Recorder, RrdRecorder, Snapshot};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
@@ -37,7 +38,7 @@ pub struct Written {
 
 #[derive(Debug)]
 enum Message {
-    Snapshot(Box<Snapshot>),
+    Snapshot(Arc<Snapshot>),
     Finish(Option<Outcome>),
 }
 
@@ -49,7 +50,8 @@ struct Failure {
 }
 
 impl Writer {
-    /// Creates the file of a recording and starts it; an existing file is replaced only if `replace` says so.
+    /// Creates the file of a recording, in the [format that its name says](Format::of), and starts it; an existing file is
+    /// replaced only if `replace` says so.
     ///
     /// # Errors
     ///
@@ -64,6 +66,23 @@ impl Writer {
     /// assert!(error.to_string().starts_with("cannot create /nowhere/run.rrd"));
     /// ```
     pub fn create(
+        path: impl AsRef<Path>,
+        replace: bool,
+        header: Header,
+    ) -> Result<Self, RecordError> {
+        let format = Format::of(&path);
+        Self::create_as(format, path, replace, header)
+    }
+
+    /// [`create`](Self::create) with the format said outright.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Exists`] or [`RecordError::Create`].
+    ///
+    /// See the example of [`create`](Self::create).
+    pub fn create_as(
+        format: Format,
         path: impl AsRef<Path>,
         replace: bool,
         header: Header,
@@ -87,7 +106,10 @@ impl Writer {
         let (queue, messages) = sync_channel(QUEUE);
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())
-            .spawn(move || write(file, header, &messages))
+            .spawn(move || match format {
+                Format::Rrd => write(file, &messages, |file| RrdRecorder::new(file, header)),
+                Format::Mcap => write(file, &messages, |file| McapRecorder::new(file, header)),
+            })
             .map_err(|source| RecordError::Create {
                 path: name.clone(),
                 source,
@@ -106,8 +128,8 @@ impl Writer {
     /// [`RecordError::Write`] if an earlier snapshot could not be written.
     ///
     /// See the example of the [module](super).
-    pub fn send(&mut self, snapshot: Snapshot) -> Result<(), RecordError> {
-        self.post(Message::Snapshot(Box::new(snapshot)))
+    pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
+        self.post(Message::Snapshot(snapshot.into()))
     }
 
     /// Writes what is left and closes the file; without an outcome the recording is marked as unfinished.
@@ -164,7 +186,11 @@ impl Drop for Writer {
 }
 
 /// The thread's work.
-fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Written, Failure> {
+fn write<R: Recorder>(
+    file: File,
+    messages: &Receiver<Message>,
+    start_recorder: impl FnOnce(File) -> io::Result<R>,
+) -> Result<Written, Failure> {
     let mut step = 0;
     let start = |source| Failure {
         step: 0,
@@ -172,7 +198,7 @@ fn write(file: File, header: Header, messages: &Receiver<Message>) -> Result<Wri
         source,
     };
     let cut = file.try_clone().map_err(start)?;
-    let mut recorder = RrdRecorder::new(file, header).map_err(|source| {
+    let mut recorder = start_recorder(file).map_err(|source| {
         drop(cut.set_len(0));
         start(source)
     })?;

@@ -74,7 +74,7 @@ struct Allowed {
 /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
 /// let mut balance = Balance::new(&scene);
-/// balance.check(run.packing(), &run.frame(), &[("energy".to_owned(), run.observables().energy)]);
+/// balance.check(run.packing(), &run.frame(), &[("energy", run.observables().energy)]);
 /// assert!(balance.agrees());
 /// ```
 #[derive(Clone, Debug)]
@@ -85,6 +85,8 @@ pub struct Balance {
     tolerance: f64,
     /// `max |A f − δ|` of the recorded forces: Saitoh (4).
     pub equation_4: Worst,
+    /// The same of the last frame alone.
+    pub last_equation_4: f64,
     /// The deepest overlap of deformed contours among pairs that are no contacts, `−gap`.
     pub overlap: Worst,
     /// The largest pull `−f` among the recorded forces; `f · gap = 0` since contacts have no gap and no other pair has a force.
@@ -126,6 +128,7 @@ impl Balance {
             threshold: scene.threshold,
             tolerance: scene.contact_tolerance,
             equation_4: Worst::default(),
+            last_equation_4: 0.0,
             overlap: Worst::default(),
             pull: Worst::default(),
             forces: Worst::default(),
@@ -144,7 +147,7 @@ impl Balance {
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
     ///
     /// See the example of [`Balance`].
-    pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(String, f64)]) {
+    pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
         self.frames += 1;
         let recorded = FrameContacts::of(packing, frame);
@@ -161,11 +164,13 @@ impl Balance {
             let geometry = Geometry::of(packing, &list);
             let gamma = self.law.line_tension();
             let matrix = ContactMatrix::of(packing, &list, &geometry, gamma);
+            self.last_equation_4 = 0.0;
             for (c, delta) in view.overlaps.iter().enumerate() {
                 let row: f64 = matrix.row(c).map(|(k, a)| a * view.forces[k]).sum();
                 let residual = matrix.diagonal()[c] * view.forces[c] + row - delta;
-                self.equation_4
-                    .of(relative(residual.abs()), allowed.lengths, step);
+                let residual = relative(residual.abs());
+                self.equation_4.of(residual, allowed.lengths, step);
+                self.last_equation_4 = self.last_equation_4.max(residual);
             }
             self.check_gaps(packing, &list, &geometry, view.forces, scale, allowed);
         }
@@ -257,7 +262,12 @@ impl Balance {
     }
 
     /// Recorded energy and pressure against those of the contacts found anew.
-    fn compare_metrics(&mut self, packing: &Packing, metrics: &[(String, f64)], allowed: Allowed) {
+    fn compare_metrics(
+        &mut self,
+        packing: &Packing,
+        metrics: &[(&'static str, f64)],
+        allowed: Allowed,
+    ) {
         let (domain, gamma) = (packing.domain(), self.law.line_tension());
         let anew = Observables::of(
             &self.law.contacts(),
@@ -267,7 +277,7 @@ impl Balance {
             (0.0, 0.0),
         );
         for (name, recorded) in metrics {
-            let value = match name.as_str() {
+            let value = match *name {
                 "energy" => anew.energy,
                 "pressure" => anew.pressure(),
                 _ => continue,

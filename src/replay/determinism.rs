@@ -6,7 +6,7 @@
 
 use super::difference::{self, Difference, What};
 use super::{Metrics, ReadError, Recording, State};
-use crate::force::Observables;
+use crate::force::{METRICS, Observables};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation};
@@ -248,14 +248,14 @@ fn walk(run: &mut Relaxation, segment: &Segment) -> Result<Option<Difference>, R
     }
 }
 
-fn metrics_differ(o: &Observables, recorded: &[(String, f64)]) -> Option<What> {
+fn metrics_differ(o: &Observables, recorded: &[(&'static str, f64)]) -> Option<What> {
     let computed = o.metrics();
     recorded.iter().find_map(|(name, here)| {
-        let (_, there) = computed.iter().find(|(n, _)| n == name)?;
+        let there = computed[METRICS.iter().position(|n| n == name)?];
         (here.to_bits() != there.to_bits()).then(|| What::Value {
             name: format!("metric {name}"),
             here: *here,
-            there: *there,
+            there,
         })
     })
 }

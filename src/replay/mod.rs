@@ -1,6 +1,6 @@
 //! Replay: a recording proves itself.
 //!
-//! [`Recording`] streams a file: its scene and radii first, then what was recorded, in the order of the file. Memory
+//! [`Recording`] streams a file of either format, `.rrd` or `.mcap`: its scene and radii first, then what was recorded, in the order of the file. Memory
 //! does not grow with the file. A frame comes out with the bits it went in with, and its digest is checked on the way.
 //!
 //! Two questions are put to it. [`determinism`]: is the trajectory what the scene gives, bit for bit? And [`Balance`]: do
@@ -11,17 +11,18 @@ mod balance;
 mod compare;
 mod determinism;
 mod difference;
-mod header;
+mod mcap;
 mod recording;
+mod rrd;
+mod source;
 mod steps;
-mod stream;
 
 pub use balance::{Balance, Worst};
 pub use compare::{Comparison, compare};
 pub use determinism::{Determinism, ReplayError, Way, determinism};
 pub use difference::{Difference, What, ulps};
 pub use recording::{Metrics, Recording, State};
-pub use stream::reading_damaged_bytes;
+pub use source::reading_damaged_bytes;
 
 use crate::frame::{Frame, FrameError};
 use crate::record::Outcome;
@@ -39,10 +40,12 @@ pub enum Event {
     State(Frame),
     /// One scalar of `/metrics`.
     Metric {
-        /// Its name, such as `f_max`.
-        name: String,
+        /// Its name, one of [`METRICS`](crate::force::METRICS).
+        name: &'static str,
         /// The step.
         step: u64,
+        /// Simulated time in nanoseconds of its unit.
+        nanoseconds: i64,
         /// Its value.
         value: f64,
     },
@@ -74,15 +77,17 @@ pub enum ReadError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The file is not an `.rrd` stream.
-    #[error("{path} is not a rerun recording: {problem}")]
-    NotRrd {
+    /// The file is not what its format asks for.
+    #[error("{path} is not {format}: {problem}")]
+    Format {
         /// Path of the file.
         path: String,
-        /// What rerun's decoder says.
+        /// What it ought to be.
+        format: &'static str,
+        /// What is wrong.
         problem: String,
     },
-    /// An `.rrd` stream of another program, or one that breaks off before its scene.
+    /// A file of another program, or one that breaks off before its scene.
     #[error("{path} is not a softjam recording: it has no {missing}")]
     NotSoftjam {
         /// Path of the file.

@@ -1,23 +1,21 @@
 //! A recording, read event by event.
 
-use super::header::Header;
+use super::mcap::McapSource;
+use super::rrd::RrdSource;
+use super::source::{Ending, Header, Item, Problem, Source};
 use super::steps::Steps;
-use super::stream::{Ending, Message, Stream, guarded};
-use super::{Event, ReadError};
-use crate::domain::{Domain, Vec2};
+use super::{Event, ReadError, mcap, rrd};
+use crate::domain::Domain;
 use crate::frame::Frame;
 use crate::packing::{Packing, coverage};
-use crate::record::Outcome;
-use crate::relax::fire::FireState;
+use crate::record::{Format, Outcome};
 use crate::scene::Scene;
-use rerun::log::Chunk;
-use rerun::{Scalars, TimelineName};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
-/// A recording that is being read: an iterator of what it holds behind its header.
+/// A recording of either format that is being read: an iterator of what it holds behind its header.
 ///
 /// # Example
 ///
@@ -41,7 +39,8 @@ use std::path::Path;
 /// ```
 pub struct Recording {
     path: String,
-    stream: Stream,
+    format: Format,
+    source: Box<dyn Source>,
     header: Header,
     /// What has been read and not yet handed out; an error is the last of it.
     events: VecDeque<Result<Event, ReadError>>,
@@ -54,7 +53,7 @@ pub struct Recording {
 }
 
 /// Metrics by step: names and values.
-pub type Metrics = BTreeMap<u64, Vec<(String, f64)>>;
+pub type Metrics = BTreeMap<u64, Vec<(&'static str, f64)>>;
 
 /// A recorded state, with what was recorded on the way to it.
 ///
@@ -102,23 +101,48 @@ impl Recording {
     ///
     /// ```
     /// let error = softjam::replay::Recording::read("nothing", &[][..], 0).err().unwrap();
-    /// assert_eq!(error.to_string(), "nothing is not a rerun recording: the file is empty");
+    /// assert_eq!(error.to_string(), "nothing is not a recording (.rrd or .mcap): the file is empty");
     /// ```
     pub fn read(
         name: &str,
         source: impl Read + Send + 'static,
         length: u64,
     ) -> Result<Self, ReadError> {
-        let path = name.to_owned();
-        let mut stream =
-            Stream::open(Box::new(source), length).map_err(|problem| ReadError::NotRrd {
-                path: path.clone(),
-                problem,
-            })?;
-        let header = Header::read(name, &mut stream)?;
+        let mut source = source;
+        let mut start = Vec::new();
+        let looked_at = source.by_ref().take(8).read_to_end(&mut start);
+        let unknown = |problem: String| ReadError::Format {
+            path: name.to_owned(),
+            format: "a recording (.rrd or .mcap)",
+            problem,
+        };
+        looked_at.map_err(|error| unknown(error.to_string()))?;
+        let format = if start.starts_with(rrd::MAGIC) {
+            Format::Rrd
+        } else if start.starts_with(mcap::MAGIC) {
+            Format::Mcap
+        } else {
+            return Err(unknown(match start.len() {
+                0 => "the file is empty".to_owned(),
+                8 => "it begins like neither".to_owned(),
+                n => format!("it has only {n} bytes"),
+            }));
+        };
+        let whole = Box::new(Cursor::new(start).chain(source));
+        let (source, header): (Box<dyn Source>, Header) = match format {
+            Format::Rrd => {
+                let (source, header) = RrdSource::open(name, whole, length)?;
+                (Box::new(source), header)
+            }
+            Format::Mcap => {
+                let (source, header) = McapSource::open(name, whole, length)?;
+                (Box::new(source), header)
+            }
+        };
         Ok(Self {
-            path,
-            stream,
+            path: name.to_owned(),
+            format,
+            source,
             steps: Steps {
                 schedule: header.scene.channels.state,
                 first: header.from_step,
@@ -168,7 +192,9 @@ impl Recording {
                         frame,
                     }));
                 }
-                Event::Metric { name, step, value } => {
+                Event::Metric {
+                    name, step, value, ..
+                } => {
                     if self.header.scene.channels.state.is_on() || self.metrics.len() < MOST {
                         self.metrics.entry(step).or_default().push((name, value));
                     }
@@ -235,12 +261,20 @@ impl Recording {
         &self.path
     }
 
+    /// The format of the file.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
     /// Whether the file was closed by its writer; if not, it breaks off. Known when the end is reached.
     ///
     /// See the example of [`Recording`].
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.stream.ending() == Some(Ending::Closed)
+        self.source.ending() == Some(Ending::Closed)
     }
 
     /// The last step whose state has been read in full.
@@ -280,163 +314,75 @@ impl Recording {
         }
     }
 
-    /// Takes a message apart into events.
-    fn take_apart(&mut self, message: Message) -> Result<(), ReadError> {
-        let (store, chunk) = match message {
-            Message::Opens => {
-                return Err(ReadError::Several {
-                    path: self.path.clone(),
-                    intact: self.steps.last,
-                });
-            }
-            Message::Layout => return Ok(()),
-            Message::Chunk(store, chunk) => (store, chunk),
-        };
-        if store != self.header.store {
-            return Err(self.damaged(format!("rows of another recording, {store:?}")));
-        }
-        let entity = chunk.entity_path().to_string();
-        match entity.as_str() {
-            "/state" => self.read_states(&chunk),
-            "/result" => self.read_result(&chunk),
-            "/world/contours" | "/world/contacts" if !chunk.is_static() => {
-                let channel = if entity == "/world/contours" {
-                    "contours"
-                } else {
-                    "contacts"
-                };
-                let steps = steps(&chunk);
-                self.events
-                    .extend(steps.map(|step| Ok(Event::Drawn { channel, step })));
-                Ok(())
-            }
-            _ => {
-                if let Some(name) = entity.strip_prefix("/metrics/") {
-                    let values = chunk.iter_slices::<f64>(Scalars::descriptor_scalars().component);
-                    for (step, value) in steps(&chunk).zip(values) {
-                        if let [value] = *value {
-                            self.events.push_back(Ok(Event::Metric {
-                                name: name.to_owned(),
-                                step,
-                                value,
-                            }));
-                        }
-                    }
-                }
-                Ok(())
-            }
-        }
-    }
-
-    fn read_states(&mut self, chunk: &Chunk) -> Result<(), ReadError> {
-        let vectors = |name: &'static str| {
-            chunk
-                .iter_slices::<[f64; 2]>(name.into())
-                .map(|list| list.iter().map(|&[x, y]| Vec2::new(x, y)).collect())
-                .collect::<Vec<Vec<Vec2>>>()
-        };
-        let numbers = |name: &'static str| {
-            chunk
-                .iter_slices::<f64>(name.into())
-                .map(<[f64]>::to_vec)
-                .collect::<Vec<_>>()
-        };
-        let steps: Vec<u64> = steps(chunk).collect();
-        let mut positions = vectors("softjam.State:position").into_iter();
-        let mut velocities = vectors("softjam.State:velocity").into_iter();
-        let mut contacts = chunk
-            .iter_slices::<[u32; 2]>("softjam.State:contact".into())
-            .map(<[[u32; 2]]>::to_vec);
-        let mut forces = numbers("softjam.State:force").into_iter();
-        let mut minimizers = numbers("softjam.State:minimizer").into_iter();
-        let mut digests = chunk
-            .iter_slices::<u8>("softjam.State:digest".into())
-            .map(<[u8]>::to_vec);
-        for step in steps {
-            let missing = |what| self.damaged(format!("no {what} at step {step}"));
-            let minimizer = minimizers
-                .next()
-                .and_then(|values| FireState::from_values(&values))
-                .ok_or_else(|| missing("minimiser state"))?;
-            let frame = Frame {
+    /// Checks what was found.
+    fn check(&mut self, item: Item) -> Result<Event, ReadError> {
+        Ok(match item {
+            Item::State(frame, digest) => self.check_state(frame, &digest)?,
+            Item::Metric {
+                name,
                 step,
-                positions: positions.next().ok_or_else(|| missing("positions"))?,
-                velocities: velocities.next().ok_or_else(|| missing("velocities"))?,
-                contacts: contacts.next().ok_or_else(|| missing("contacts"))?,
-                forces: forces.next().ok_or_else(|| missing("forces"))?,
-                minimizer,
-            };
-            let digest = digests.next().ok_or_else(|| missing("digest"))?;
-            if frame.digest() != digest.as_slice() {
-                return Err(ReadError::Digest {
-                    path: self.path.clone(),
-                    step,
-                    intact: self.steps.last,
-                });
-            }
-            frame
-                .validate(self.header.radii.len(), self.header.domain)
-                .map_err(|source| ReadError::Frame {
-                    path: self.path.clone(),
-                    step,
-                    source,
-                    intact: self.steps.last,
-                })?;
-            self.steps
-                .accept(step)
-                .map_err(|problem| ReadError::Steps {
-                    path: self.path.clone(),
-                    problem,
-                    intact: self.steps.last,
-                })?;
-            self.steps.last = Some(step);
-            self.digests.update(&digest);
-            self.events.push_back(Ok(Event::State(frame)));
-        }
-        Ok(())
+                nanoseconds,
+                value,
+            } => Event::Metric {
+                name,
+                step,
+                nanoseconds,
+                value,
+            },
+            Item::Drawn { channel, step } => Event::Drawn { channel, step },
+            Item::Result(outcome, digest) => self.check_result(outcome, digest)?,
+        })
     }
 
-    fn read_result(&mut self, chunk: &Chunk) -> Result<(), ReadError> {
-        let converged = chunk
-            .iter_slices::<bool>("softjam.Result:converged".into())
-            .next()
-            .and_then(|list| list.iter().next());
-        let mut steps = chunk.iter_slices::<u64>("softjam.Result:steps".into());
-        let steps = steps.next().and_then(|list| list.first().copied());
-        let mut f_max = chunk.iter_slices::<f64>("softjam.Result:f_max".into());
-        let f_max = f_max.next().and_then(|list| list.first().copied());
-        let digest = chunk
-            .iter_slices::<u8>("softjam.Result:digest".into())
-            .next()
-            .and_then(|bytes| bytes.try_into().ok());
-        let (Some(converged), Some(steps), Some(f_max), Some(digest)) =
-            (converged, steps, f_max, digest)
-        else {
-            return Err(self.damaged("its result is not whole"));
-        };
-        let outcome = Outcome {
-            converged,
-            steps,
-            f_max,
-        };
+    fn check_state(&mut self, frame: Frame, digest: &[u8]) -> Result<Event, ReadError> {
+        let step = frame.step;
+        let intact = self.steps.last;
+        if frame.digest() != digest {
+            return Err(ReadError::Digest {
+                path: self.path.clone(),
+                step,
+                intact,
+            });
+        }
+        frame
+            .validate(self.header.radii.len(), self.header.domain)
+            .map_err(|source| ReadError::Frame {
+                path: self.path.clone(),
+                step,
+                source,
+                intact,
+            })?;
+        self.steps
+            .accept(step)
+            .map_err(|problem| ReadError::Steps {
+                path: self.path.clone(),
+                problem,
+                intact,
+            })?;
+        self.steps.last = Some(step);
+        self.digests.update(digest);
+        Ok(Event::State(frame))
+    }
+
+    fn check_result(&mut self, outcome: Outcome, digest: [u8; 32]) -> Result<Event, ReadError> {
         let wrong = |problem: String| ReadError::Result {
             path: self.path.clone(),
             problem,
             intact: self.steps.last,
         };
-        if digest != self.digests.finalize().as_bytes().as_slice() {
+        if digest != *self.digests.finalize().as_bytes() {
             return Err(wrong(
                 "its digest is not that of the states before it".to_owned(),
             ));
         }
-        if self.steps.last.is_some_and(|last| last != steps) {
-            return Err(wrong(format!("it names {steps} steps")));
+        if self.steps.last.is_some_and(|last| last != outcome.steps) {
+            return Err(wrong(format!("it names {} steps", outcome.steps)));
         }
-        if self.outcome.replace(outcome).is_some() {
+        if self.outcome.is_some() {
             return Err(wrong("it is there twice".to_owned()));
         }
-        self.events.push_back(Ok(Event::Result { outcome, digest }));
-        Ok(())
+        self.outcome = Some(outcome);
+        Ok(Event::Result { outcome, digest })
     }
 }
 
@@ -452,34 +398,33 @@ impl Iterator for Recording {
             if self.ended {
                 return None;
             }
-            let read = match self.stream.next() {
-                Ok(Some(message)) => {
-                    let mut read = Ok(());
-                    let decoded = guarded(|| {
-                        read = self.take_apart(message);
-                        Ok(())
-                    });
-                    decoded.map_err(|problem| self.damaged(problem)).and(read)
+            let mut items = Vec::new();
+            let read = self.source.read_on(&mut items);
+            // What was whole in front of the damage counts.
+            for item in items {
+                let event = self.check(item);
+                self.ended = event.is_err();
+                self.events.push_back(event);
+                if self.ended {
+                    break;
                 }
-                Ok(None) => {
-                    self.ended = true;
-                    Ok(())
-                }
-                Err(problem) => Err(self.damaged(problem)),
-            };
-            if let Err(error) = read {
-                self.ended = true;
-                self.events.push_back(Err(error));
             }
+            let problem = match read {
+                _ if self.ended => continue,
+                Ok(goes_on) => {
+                    self.ended = !goes_on;
+                    continue;
+                }
+                Err(problem) => problem,
+            };
+            self.ended = true;
+            self.events.push_back(Err(match problem {
+                Problem::Damage(problem) => self.damaged(problem),
+                Problem::Several => ReadError::Several {
+                    path: self.path.clone(),
+                    intact: self.steps.last,
+                },
+            }));
         }
     }
-}
-
-fn steps(chunk: &Chunk) -> impl Iterator<Item = u64> + '_ {
-    let step: TimelineName = "step".into();
-    chunk
-        .iter_indices(&step)
-        .map(|(time, _)| u64::try_from(time.as_i64()).unwrap_or(0))
-        .collect::<Vec<_>>()
-        .into_iter()
 }

@@ -181,6 +181,20 @@ impl Channels {
             ("state", self.state),
         ]
     }
+
+    /// Which of the channels, in the order of [`named`](Self::named), are recorded at `step`. At an `edge`, the first or
+    /// the last frame of a recording, every channel is that is on.
+    ///
+    /// ```
+    /// let channels = softjam::scene::Channels::default();
+    /// assert_eq!(channels.at(7, false), [false, false, true, false]);
+    /// assert_eq!(channels.at(7, true), [true; 4]);
+    /// ```
+    #[must_use]
+    pub fn at(&self, step: u64, edge: bool) -> [bool; 4] {
+        let recorded = |s: Schedule| s.includes(step) || (edge && s.is_on());
+        self.named().map(|(_, schedule)| recorded(schedule))
+    }
 }
 
 #[cfg(test)]

@@ -13,11 +13,17 @@
 )]
 
 mod common;
+#[cfg(feature = "figure")]
+mod figures;
+#[cfg(feature = "recording")]
+mod files;
+#[cfg(feature = "recording")]
+mod mcap;
 mod physics;
 #[cfg(feature = "cli")]
 mod program;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 mod recording;
-#[cfg(feature = "rrd")]
+#[cfg(feature = "recording")]
 mod replay;
 mod scenes;

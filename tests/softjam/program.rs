@@ -1,5 +1,6 @@
 //! The program at its process boundary: exit codes, files, messages.
 
+mod convert;
 mod replay;
 
 use crate::common::Folder;
@@ -57,6 +58,51 @@ fn without_arguments_the_default_scene_ends_up_in_softjam_rrd() {
         assert!(out.contains(word), "the summary lacks {word}:\n{out}");
     }
     assert_eq!(errors, "", "no progress bar unless there is a terminal");
+}
+
+#[test]
+fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
+    let folder = folder();
+    record(folder.path(), "a.rrd", &[]);
+    record(folder.path(), "b.mcap", &["--seed", "2"]);
+    record(folder.path(), "m.rrd", &["--channels", "metrics"]);
+    let drawn: [&[&str]; 4] = [
+        &["a.rrd", "-o", "a.svg"],
+        &["b.mcap", "--step", "20", "--disks", "-o", "b.png"],
+        &[
+            "a.rrd",
+            "--color",
+            "deformation",
+            "--no-chains",
+            "-o",
+            "c.svg",
+        ],
+        &["--fmax", "a.rrd", "b.mcap", "m.rrd", "-o", "d.svg"],
+    ];
+    for arguments in drawn {
+        let (code, _, errors) = run(folder.path(), &[&["figure"], arguments].concat());
+        assert_eq!(code, Some(0), "{arguments:?}: {errors}");
+    }
+    let text = std::fs::read_to_string(folder.path().join("d.svg")).expect("d.svg");
+    assert!(
+        text.contains("seed 2") && !text.contains("N = 64"),
+        "only what differs"
+    );
+    let refused: [(&[&str], &str); 5] = [
+        (&["a.rrd", "-o", "a.svg"], "a.svg exists"),
+        (&["a.rrd", "-o", "x.gif"], ".svg or .png"),
+        (
+            &["a.rrd", "--step", "13", "-o", "x.svg"],
+            "the nearest before it is 10",
+        ),
+        (&["m.rrd", "-o", "x.svg"], "holds no state"),
+        (&["a.rrd", "b.mcap", "-o", "x.svg"], "--fmax"),
+    ];
+    for (arguments, words) in refused {
+        let (code, _, errors) = run(folder.path(), &[&["figure"], arguments].concat());
+        assert_eq!(code, Some(2), "{arguments:?}: {errors}");
+        assert!(errors.contains(words), "{arguments:?}: {errors}");
+    }
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Recordings: what goes in comes out, damage is noticed, failures are reported where they happen.
 
 use crate::common::Folder;
+use crate::files::{FORMATS, SmallDisk, open, record_all, record_as, recorder};
 use softjam::frame::Frame;
-use softjam::record::{self, Header, RrdRecorder, Snapshot, Writer};
+use softjam::record::{self, Header, Writer};
 use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::{Channels, Scene, Schedule};
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 fn scene() -> Scene {
@@ -24,7 +25,7 @@ fn scene() -> Scene {
 fn record_to(path: &Path, scene: &Scene) {
     let mut run = Relaxation::new(scene).expect("a valid scene");
     let writer = Writer::create(path, false, Header::of(scene, &run)).expect("a file");
-    record::record(&mut run, writer, &scene.channels, |_| true).expect("recorded");
+    record::record(&mut run, vec![writer], &scene.channels, |_| true).expect("recorded");
 }
 
 fn states(path: &Path) -> Vec<Frame> {
@@ -139,7 +140,7 @@ fn other_files_are_told_apart_from_recordings() {
         Recording::open(&path).err().expect("refused").to_string()
     };
     assert!(open(b"").contains("is not a"));
-    assert!(open(b"# box = 1, 1\nx,y,radius\n").contains("is not a rerun recording"));
+    assert!(open(b"# box = 1, 1\nx,y,radius\n").contains("is not a recording (.rrd or .mcap)"));
     let path = folder.path().join("a.rrd");
     record_to(&path, &scene());
     let bytes = std::fs::read(&path).expect("bytes");
@@ -147,58 +148,39 @@ fn other_files_are_told_apart_from_recordings() {
     assert!(open(&bytes[..2000]).contains("not a softjam recording"));
 }
 
-/// A disk of limited size.
-struct SmallDisk {
-    left: usize,
-}
-
-impl Write for SmallDisk {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.left == 0 {
-            return Err(io::ErrorKind::StorageFull.into());
-        }
-        let n = bytes.len().min(self.left);
-        self.left -= n;
-        Ok(n)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 #[test]
 fn a_disk_that_fills_up_is_reported_at_once_wherever_it_happens() {
     let scene = scene();
     let start = Relaxation::new(&scene).expect("a valid scene");
-    let mut failures = 0;
-    for left in (0..3_000_000).step_by(299_993) {
-        let mut run = start.clone();
-        let recorder = RrdRecorder::new(SmallDisk { left }, Header::of(&scene, &run));
-        let Ok(mut recorder) = recorder else {
-            failures += 1;
-            continue;
-        };
-        let result = loop {
-            let last = run.status() != Status::Running;
-            let snapshot = Snapshot::of(&run, &scene.channels, last);
-            if let Some(Err(error)) = snapshot.map(|s| recorder.record(&s)) {
-                break Err(error);
-            }
-            if last {
-                break recorder.finish(None).map(|_| ());
-            }
-            run.advance().expect("a step");
-        };
-        if let Err(error) = result {
-            failures += 1;
+    for format in FORMATS {
+        let whole = record_as(format, &scene, |_| {}).len();
+        let mut failures = 0;
+        for tenth in 0..10 {
+            let size = whole * tenth / 10;
+            let (mut run, mut bytes) = (start.clone(), Vec::new());
+            let disk = SmallDisk {
+                bytes: &mut bytes,
+                size,
+            };
+            let Ok(mut recorder) = recorder(format, disk, Header::of(&scene, &run)) else {
+                continue;
+            };
+            let error = record_all(recorder.as_mut(), &mut run, &scene, |_| {})
+                .expect_err("the disk is too small");
             assert_eq!(error.kind(), io::ErrorKind::StorageFull);
-            assert!(recorder.written() <= left as u64);
-            assert!(recorder.intact().is_none_or(|step| step <= run.step()));
+            let (written, intact) = (recorder.written(), recorder.intact());
+            drop(recorder);
+            assert!(written <= size as u64 && bytes.len() <= size);
+            // Cut back to what is whole, the file is a recording that breaks off.
+            let mut recording = open(&bytes[..written as usize]).expect("a header");
+            recording
+                .by_ref()
+                .for_each(|event| drop(event.expect("whole")));
+            assert!(!recording.is_closed());
+            let scheduled = |step: u64| step - step % 7;
+            assert_eq!(recording.intact(), intact.map(scheduled));
+            failures += 1;
         }
+        assert!(failures >= 7, "{failures} disks: the test tests nothing");
     }
-    assert!(
-        failures >= 5,
-        "only {failures} disks were too small: the test tests nothing"
-    );
 }

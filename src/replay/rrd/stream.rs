@@ -4,6 +4,7 @@
 //! compressed message claims to need. A recording that is to be trusted needs to know. The messages themselves are
 //! decoded by rerun.
 
+use crate::replay::source::{Ending, guarded};
 use re_protos::common::v1alpha1::Compression;
 use re_protos::log_msg::v1alpha1::ArrowMsg;
 use re_protos::log_msg::v1alpha1::log_msg::Msg;
@@ -15,9 +16,7 @@ use rerun::external::re_log_encoding::rrd::{
 };
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::log::Chunk;
-use std::cell::Cell;
 use std::io::{self, Read};
-use std::panic::AssertUnwindSafe;
 
 /// A stream that is being read, message by message.
 pub(super) struct Stream {
@@ -26,15 +25,6 @@ pub(super) struct Stream {
     offset: u64,
     bytes: Vec<u8>,
     ending: Option<Ending>,
-}
-
-/// How a stream ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ending {
-    /// With a footer, as its writer meant it.
-    Closed,
-    /// Without one, behind this byte.
-    BreaksOff(u64),
 }
 
 /// A message that matters here.
@@ -81,7 +71,7 @@ impl Stream {
         let start = self.offset;
         let header_size = MessageHeader::ENCODED_SIZE_BYTES as u64;
         if self.length - start < header_size {
-            self.ending = Some(Ending::BreaksOff(start));
+            self.ending = Some(Ending::BreaksOff);
             return Ok(None);
         }
         self.bytes.clear();
@@ -89,7 +79,7 @@ impl Stream {
         let at = |problem: String| format!("the message at byte {start}: {problem}");
         let header = MessageHeader::from_rrd_bytes(&self.bytes).map_err(|e| at(e.to_string()))?;
         if header.len > self.length - self.offset {
-            self.ending = Some(Ending::BreaksOff(start));
+            self.ending = Some(Ending::BreaksOff);
             return Ok(None);
         }
         self.read(header.len)?;
@@ -131,7 +121,7 @@ impl Stream {
         let left = self.length - self.offset;
         let footer = StreamFooter::ENCODED_SIZE_BYTES as u64;
         if left < footer {
-            self.ending = Some(Ending::BreaksOff(self.offset));
+            self.ending = Some(Ending::BreaksOff);
             return Ok(None);
         }
         self.bytes.clear();
@@ -206,31 +196,4 @@ fn check_claims(mut bytes: &[u8]) -> Result<(), String> {
         bytes = &rest[end.ok_or("an Arrow message claims more bytes than there are")?..];
     }
     Ok(())
-}
-
-thread_local! {
-    static GUARDED: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Runs the decoding of somebody else's bytes. Arrow panics at some that are damaged; here that is an error like others.
-pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    let before = GUARDED.replace(true);
-    let result = std::panic::catch_unwind(AssertUnwindSafe(decode));
-    GUARDED.set(before);
-    result.unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        Err(text.unwrap_or("it cannot be decoded").to_owned())
-    })
-}
-
-/// Whether a panic on this thread would only mean that a file is damaged, and is turned into a
-/// [`ReadError`](super::ReadError): what a program's panic hook may want to know, to keep quiet.
-///
-/// ```
-/// assert!(!softjam::replay::reading_damaged_bytes());
-/// ```
-#[must_use]
-pub fn reading_damaged_bytes() -> bool {
-    GUARDED.get()
 }

@@ -1,0 +1,42 @@
+"""The figure that both readers draw, and the bytes by which they are compared with each other and with softjam."""
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+METRICS = ("f_max", "log10_f_max", "energy", "pressure", "coordination", "contacts", "rattlers", "dt", "stress_xy")
+
+
+def plot(f_max, forces, path):
+    """f_max {step: value} on a logarithmic axis beside the distribution of forces, in units of their mean."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    steps = sorted(f_max)
+    left.semilogy(steps, [max(f_max[step], 1e-18) for step in steps], lw=1, color="#21618c")
+    left.set(xlabel="step", ylabel=r"$f_\mathrm{max}\,/\,\gamma$", xlim=(0, max(steps[-1], 1)))
+    if len(forces):
+        right.hist(forces / forces.mean(), bins=40, range=(0, 4), density=True, color="#5d9cbf")
+    right.set(xlabel=r"$f\,/\,\langle f\rangle$", ylabel=r"$P(f\,/\,\langle f\rangle)$", xlim=(0, 4))
+    for axes in (left, right):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=160)
+
+
+def write_bits(metrics, states, path):
+    """Every number, little-endian: a row of metrics a step, then step, r, v, contacts, f, minimiser a state."""
+    with open(path, "wb") as file:
+        for step in sorted(metrics["f_max"]):
+            file.write(np.uint64(step).astype("<u8").tobytes())
+            file.write(np.array([metrics[name][step] for name in METRICS], dtype="<f8").tobytes())
+        for step in sorted(states):
+            state = states[step]
+            file.write(np.uint64(step).astype("<u8").tobytes())
+            for name, kind in (
+                ("position", "<f8"),
+                ("velocity", "<f8"),
+                ("contact", "<u4"),
+                ("force", "<f8"),
+                ("minimizer", "<f8"),
+            ):
+                file.write(state[name].astype(kind).tobytes())

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Reads a softjam .mcap recording into numpy and plots f_max against step and the distribution of contact forces.
+
+usage: read_mcap.py RUN.mcap [-o FIGURE.png] [--bits FILE]
+needs: pip install mcap mcap-protobuf-support numpy matplotlib
+"""
+
+import argparse
+
+import numpy as np
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+from plot import plot, write_bits
+
+
+def read(path):
+    """Metrics {name: {step: value}} and states {step: {name: array}} of a recording."""
+    metrics, states = {}, {}
+    with open(path, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        for _, channel, _, message in reader.iter_decoded_messages(topics=["/metrics", "/state"]):
+            if channel.topic == "/metrics":
+                for field, value in message.ListFields():
+                    if field.name not in ("step", "sim_time_ns"):
+                        metrics.setdefault(field.name, {})[message.step] = value
+            else:
+                states[message.step] = {
+                    "position": np.array(message.position).reshape(-1, 2),
+                    "velocity": np.array(message.velocity).reshape(-1, 2),
+                    "contact": np.array(message.contact, dtype=np.uint32).reshape(-1, 2),
+                    "force": np.array(message.force),
+                    "minimizer": np.array(message.minimizer),
+                }
+    return metrics, states
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("recording")
+    arguments.add_argument("-o", "--output", default="recording.png")
+    arguments.add_argument("--bits", help="write every number read as little-endian bytes, to compare readers")
+    arguments = arguments.parse_args()
+    metrics, states = read(arguments.recording)
+    last = max(states)
+    f = states[last]["force"]
+    print(f"{len(states)} states, {len(metrics['f_max'])} steps of metrics")
+    print(f"step {last}: f_max = {metrics['f_max'][last]!r}, {len(f)} contacts, mean force {f.mean():.6e}")
+    plot(metrics["f_max"], f, arguments.output)
+    if arguments.bits:
+        write_bits(metrics, states, arguments.bits)

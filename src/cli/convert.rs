@@ -1,0 +1,89 @@
+//! `softjam convert`: from one format to the other, with more channels or fewer.
+
+use super::flags::ChannelFlags;
+use super::output::{Output, open_with};
+use super::{Verdict, print};
+use indicatif::HumanBytes;
+use softjam::convert::{self, ConvertError};
+use softjam::record::Writer;
+use softjam::replay::Recording;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  softjam convert run.rrd run.mcap                          the same recording for Foxglove
+  softjam convert run.rrd small.rrd --channels state        the small file to share
+  softjam convert small.rrd run.rrd --channels contours,contacts,metrics,state
+                                                            everything else, rebuilt from it
+  softjam convert run.rrd fine.rrd --channels state,metrics,contours=every:1
+                                                            steps that run.rrd lacks are computed again
+States, metrics, scene and result go over as they are; contours and contacts are drawn anew from the states.")]
+pub struct Arguments {
+    /// The recording to convert, .rrd or .mcap.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+
+    /// The file to write; a name that ends in .mcap gives MCAP, any other .rrd.
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+
+    #[command(flatten)]
+    channels: ChannelFlags,
+
+    /// Replace an existing file.
+    #[arg(long, short)]
+    force: bool,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    let output = Output::named(&arguments.output);
+    output.check(&[Some(&arguments.input)], arguments.force)?;
+    let mut recording = Recording::open(&arguments.input)?;
+    let held = recording.scene().channels;
+    let channels = arguments.channels.over(held)?.unwrap_or(held);
+    let header = convert::header(&recording, channels)?;
+    let writer = Writer::create(&output.path, arguments.force, header)?;
+    let converted = convert::convert(&mut recording, writer, &channels);
+    let converted = converted.map_err(|error| match error {
+        ConvertError::Read(error) => anyhow::Error::new(error).context(format!(
+            "{} holds what came before the damage",
+            output.path.display()
+        )),
+        other => other.into(),
+    })?;
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<14} {value}");
+    };
+    let path = output.path.display();
+    line(
+        "file",
+        format!(
+            "{path} ({}, {} states)",
+            HumanBytes(converted.written.bytes),
+            converted.written.states
+        ),
+    );
+    if converted.rebuilt > 0 {
+        let steps = converted.rebuilt;
+        line(
+            "rebuilt",
+            format!("{steps} steps computed again, in agreement with the recorded states"),
+        );
+    }
+    line("open it with", open_with(&output.path, output.format));
+    print(&text)?;
+    if recording.is_closed() {
+        return Ok(Verdict::Good);
+    }
+    let intact = recording
+        .intact()
+        .map_or("no state".to_owned(), |step| format!("step {step}"));
+    anyhow::bail!(
+        "{} breaks off; {path} is whole up to {intact} and names no result",
+        recording.path(),
+    )
+}

@@ -1,0 +1,174 @@
+//! `softjam figure`: pictures for papers and talks.
+
+use super::{Verdict, print};
+use softjam::figure::{self, ColorBy, Fall, FigureError, Shape, Style};
+use softjam::frame::Frame;
+use softjam::replay::{Event, Recording};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
+  softjam figure run.rrd --step 0 --disks -o disks.png    the undeformed disks of step 0
+  softjam figure run.rrd --color deformation --no-chains -o shapes.svg
+  softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run")]
+pub struct Arguments {
+    /// The recording, .rrd or .mcap; with --fmax, as many as there are curves.
+    #[arg(value_name = "RUN.rrd", required = true)]
+    files: Vec<PathBuf>,
+
+    /// File to write; its name ends in .svg or .png.
+    #[arg(long, short, value_name = "FIGURE.svg")]
+    output: PathBuf,
+
+    /// Draw f_max against step instead of a packing.
+    #[arg(long, conflicts_with_all = ["step", "disks", "color", "no_chains"])]
+    fmax: bool,
+
+    /// The recorded step to draw: a number or `last`.
+    #[arg(long, value_name = "K", default_value = "last", value_parser = step)]
+    step: Step,
+
+    /// Draw the undeformed disks instead of the contours.
+    #[arg(long)]
+    disks: bool,
+
+    /// What the colour of a particle means: pressure, deformation or nothing.
+    #[arg(long, value_name = "QUANTITY", default_value = "pressure", value_parser = super::flags::named::<ColorBy>)]
+    color: ColorBy,
+
+    /// Leave the force chains out.
+    #[arg(long)]
+    no_chains: bool,
+
+    /// Replace an existing file.
+    #[arg(long, short)]
+    force: bool,
+}
+
+#[derive(Clone, Copy)]
+enum Step {
+    Last,
+    Number(u64),
+}
+
+fn step(text: &str) -> Result<Step, String> {
+    match text {
+        "last" => Ok(Step::Last),
+        number => number
+            .parse()
+            .map(Step::Number)
+            .map_err(|_| "a step is a whole number, or `last`".to_owned()),
+    }
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    let output = &arguments.output;
+    figure::check_name(output)?;
+    let inputs: Vec<Option<&Path>> = arguments.files.iter().map(|f| Some(f.as_path())).collect();
+    super::output::Output::named(output).check(&inputs, arguments.force)?;
+    let svg = if arguments.fmax {
+        let runs = arguments.files.iter().map(|path| fall(path));
+        figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
+    } else {
+        let [path] = arguments.files.as_slice() else {
+            return Err(FigureError::Nothing(
+                "a packing is drawn of one recording; several are for --fmax".to_owned(),
+            )
+            .into());
+        };
+        packing(path, arguments)?
+    };
+    figure::write(output, &svg)?;
+    print(&format!("figure         {}\n", output.display()))?;
+    Ok(Verdict::Good)
+}
+
+/// What tells runs apart: coverage, number of particles, seed.
+type Names = [String; 3];
+
+/// Each curve is called by what is not the same in all of them, or by its coverage.
+fn named(runs: Vec<(Names, Vec<(u64, f64)>)>) -> Vec<Fall> {
+    let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
+    let shown: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
+    let label = |names: &Names| {
+        shown
+            .iter()
+            .map(|k| names[*k].as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    runs.iter()
+        .map(|(names, points)| Fall {
+            label: label(names),
+            points: points.clone(),
+        })
+        .collect()
+}
+
+fn fall(path: &Path) -> anyhow::Result<(Names, Vec<(u64, f64)>)> {
+    let mut recording = Recording::open(path)?;
+    let mut points = Vec::new();
+    for event in recording.by_ref() {
+        if let Event::Metric {
+            name: "f_max",
+            step,
+            value,
+            ..
+        } = event?
+        {
+            points.push((step, value));
+        }
+    }
+    if points.is_empty() {
+        let path = path.display();
+        let problem = format!("{path} holds no metrics; record it with --channels metrics,…");
+        return Err(FigureError::Nothing(problem).into());
+    }
+    points.sort_by_key(|p| p.0);
+    let names = [
+        format!("φ = {:.3}", recording.coverage()),
+        format!("N = {}", recording.radii().len()),
+        format!("seed {}", recording.scene().seed),
+    ];
+    Ok((names, points))
+}
+
+fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
+    let mut recording = Recording::open(path)?;
+    let mut found: Option<Frame> = None;
+    for event in recording.by_ref() {
+        if let Event::State(frame) = event? {
+            let at = frame.step;
+            if matches!(arguments.step, Step::Number(k) if at > k) {
+                break;
+            }
+            found = Some(frame);
+        }
+    }
+    let shown = path.display();
+    let frame = match (found, arguments.step) {
+        (None, _) => Err(format!("{shown} holds no state to draw")),
+        (Some(frame), Step::Number(k)) if frame.step != k => Err(format!(
+            "{shown} holds no state of step {k}; the nearest before it is {}. `softjam convert` with \
+             --channels state=every:1 brings it back",
+            frame.step
+        )),
+        (Some(frame), _) => Ok(frame),
+    };
+    let frame = frame.map_err(FigureError::Nothing)?;
+    let style = Style {
+        shape: if arguments.disks {
+            Shape::Disk
+        } else {
+            Shape::Contour
+        },
+        color: arguments.color,
+        chains: !arguments.no_chains,
+        ..Style::default()
+    };
+    let packing = recording.packing(&frame)?;
+    let line_tension = recording.scene().line_tension;
+    Ok(figure::packing(&packing, &frame, line_tension, &style))
+}

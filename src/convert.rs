@@ -1,0 +1,373 @@
+//! Converting recordings: `.rrd` ⇄ `.mcap`, with more channels or fewer.
+//!
+//! States, metrics, scene and result go over as they are. Contours and contacts are drawn anew from the states, and so is
+//! whatever else the channels ask for at steps that the recording does not hold: a frame determines the next one, so the
+//! run is walked again from the recorded frame before, and has to arrive at the recorded frame behind.
+//!
+//! ```
+//! use softjam::{convert, record, relax::Relaxation, replay::Recording, scene::{Channels, Scene}};
+//!
+//! let folder = std::env::temp_dir();
+//! let path = |name: &str| folder.join(format!("softjam-convert-example-{name}"));
+//! let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+//! let mut run = Relaxation::new(&scene).unwrap();
+//! let writer = record::Writer::create(path("a.rrd"), true, record::Header::of(&scene, &run)).unwrap();
+//! record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
+//!
+//! for (from, to) in [("a.rrd", "b.mcap"), ("b.mcap", "c.rrd")] {
+//!     let mut recording = Recording::open(path(from)).unwrap();
+//!     let header = convert::header(&recording, scene.channels).unwrap();
+//!     let writer = record::Writer::create(path(to), true, header).unwrap();
+//!     convert::convert(&mut recording, writer, &scene.channels).unwrap();
+//! }
+//! assert!(std::fs::read(path("a.rrd")).unwrap() == std::fs::read(path("c.rrd")).unwrap());
+//! # for name in ["a.rrd", "b.mcap", "c.rrd"] { std::fs::remove_file(path(name)).unwrap(); }
+//! ```
+
+use crate::domain::Vec2;
+use crate::force::{METRICS, Metrics};
+use crate::frame::Frame;
+use crate::record::{Header, Outcome, RecordError, Snapshot, Writer, Written, nanoseconds};
+use crate::relax::{RelaxError, Relaxation};
+use crate::replay::{Event, ReadError, Recording};
+use crate::scene::{Channels, Scene, Schedule};
+use std::collections::BTreeMap;
+
+/// What a conversion came to.
+///
+/// See the example of the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Converted {
+    /// How the run ended; `None` if the recording is one of an unfinished run.
+    pub outcome: Option<Outcome>,
+    /// What was written.
+    pub written: Written,
+    /// Steps that were walked again, because the recording does not hold what was asked for.
+    pub rebuilt: u64,
+}
+
+/// Why a recording cannot be converted.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// The recording is damaged; what is whole has been converted.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The new file could not be written.
+    #[error(transparent)]
+    Write(#[from] RecordError),
+    /// The run could not be walked again.
+    #[error(transparent)]
+    Run(#[from] RelaxError),
+    /// The channels ask for what only a state can give.
+    #[error(
+        "{path} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
+         `--channels metrics` and their schedule as it is"
+    )]
+    NoState {
+        /// Path of the recording.
+        path: String,
+    },
+    /// Walking the run again did not lead to the recorded frame.
+    #[error(
+        "walking again from step {from} does not lead to the recorded state of step {step}: see `softjam replay {path}`"
+    )]
+    Differs {
+        /// Path of the recording.
+        path: String,
+        /// The recorded step before.
+        from: u64,
+        /// The recorded step behind.
+        step: u64,
+    },
+}
+
+/// The header of a conversion of `recording` to `channels`.
+///
+/// # Errors
+///
+/// [`ConvertError::NoState`] if the recording does not hold what the channels need.
+///
+/// See the example of the [module](self).
+pub fn header(recording: &Recording, channels: Channels) -> Result<Header, ConvertError> {
+    can_be_rebuilt(recording, &channels)?;
+    // Radii and box are all that a header has of a packing.
+    let anywhere = Frame {
+        positions: vec![Vec2::zeros(); recording.radii().len()],
+        ..Frame::default()
+    };
+    Ok(Header {
+        scene: Scene {
+            channels,
+            ..recording.scene().clone()
+        },
+        packing: recording.packing(&anywhere)?,
+        from_step: recording.from_step(),
+    })
+}
+
+/// Writes what `channels` ask of `recording` with `writer`, whose header is that of [`header`].
+///
+/// # Errors
+///
+/// [`ConvertError`]; the new file is then closed as one of an unfinished run and holds what came before the error.
+///
+/// See the example of the [module](self).
+pub fn convert(
+    recording: &mut Recording,
+    writer: Writer,
+    channels: &Channels,
+) -> Result<Converted, ConvertError> {
+    can_be_rebuilt(recording, channels)?;
+    let mut conversion = Conversion {
+        writer,
+        channels: *channels,
+        first: recording.from_step(),
+        waiting: BTreeMap::new(),
+        last: None,
+        rebuilt: 0,
+    };
+    let mut damage = None;
+    while damage.is_none() {
+        match recording.next() {
+            None => break,
+            Some(Err(error)) => damage = Some(error),
+            Some(Ok(Event::State(frame))) => conversion.arrive(recording, frame)?,
+            Some(Ok(Event::Metric {
+                name,
+                step,
+                nanoseconds,
+                value,
+            })) => {
+                conversion.keep(name, step, nanoseconds, value);
+                if !recording.scene().channels.state.is_on() {
+                    conversion.write_whole_rows()?;
+                }
+            }
+            Some(Ok(Event::Drawn { .. } | Event::Result { .. })) => {}
+        }
+    }
+    conversion.end(recording, damage)
+}
+
+/// Without states only the metrics can go over, as they are.
+fn can_be_rebuilt(recording: &Recording, wanted: &Channels) -> Result<(), ConvertError> {
+    let held = &recording.scene().channels;
+    let pictures = [wanted.contours, wanted.contacts, wanted.state];
+    if !held.state.is_on()
+        && (pictures.into_iter().any(Schedule::is_on)
+            || (wanted.metrics.is_on() && wanted.metrics != held.metrics))
+    {
+        return Err(ConvertError::NoState {
+            path: recording.path().to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// A conversion on its way.
+struct Conversion {
+    writer: Writer,
+    channels: Channels,
+    /// The step that the recording begins with.
+    first: u64,
+    /// Metrics of steps that are not written yet.
+    waiting: BTreeMap<u64, Row>,
+    /// The last recorded frame; not written yet, since the last of all is written by every channel.
+    last: Option<Frame>,
+    rebuilt: u64,
+}
+
+/// The metrics of a step as far as they have been read.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    nanoseconds: i64,
+    values: [Option<f64>; METRICS.len()],
+}
+
+impl Row {
+    fn whole(&self) -> Option<Metrics> {
+        let mut metrics = [0.0; METRICS.len()];
+        for (metric, value) in metrics.iter_mut().zip(self.values) {
+            *metric = value?;
+        }
+        Some(metrics)
+    }
+}
+
+impl Conversion {
+    fn keep(&mut self, name: &str, step: u64, nanoseconds: i64, value: f64) {
+        if let Some(place) = METRICS.iter().position(|known| *known == name) {
+            let row = self.waiting.entry(step).or_default();
+            row.nanoseconds = nanoseconds;
+            row.values[place] = Some(value);
+        }
+    }
+
+    /// A recorded frame: everything in front of it can be written.
+    fn arrive(&mut self, recording: &Recording, frame: Frame) -> Result<(), ConvertError> {
+        if let Some(from) = self.last.take() {
+            self.write_frame(recording, &from, false)?;
+            let behind = from.step + 1;
+            if self.lacks_something(behind, frame.step) {
+                self.walk(recording, from, &frame)?;
+            } else {
+                let rows: Vec<_> = self.waiting.range(behind..frame.step).collect();
+                let rows: Vec<(u64, Row)> = rows.into_iter().map(|(k, row)| (*k, *row)).collect();
+                for (step, row) in rows {
+                    self.write_row(step, row)?;
+                }
+            }
+        }
+        self.waiting = self.waiting.split_off(&frame.step);
+        self.last = Some(frame);
+        Ok(())
+    }
+
+    /// Whether the channels ask for something at the steps from `behind` to before `until` that was not recorded.
+    fn lacks_something(&self, behind: u64, until: u64) -> bool {
+        let Channels {
+            contours,
+            contacts,
+            metrics,
+            state,
+        } = self.channels;
+        let asks = |schedule: Schedule| {
+            let first = behind.checked_sub(1).and_then(|step| schedule.after(step));
+            first.filter(|step| *step < until)
+        };
+        if [contours, contacts, state]
+            .into_iter()
+            .any(|s| asks(s).is_some())
+        {
+            return true;
+        }
+        let mut step = asks(metrics);
+        while let Some(k) = step.filter(|k| *k < until) {
+            if self.waiting.get(&k).and_then(Row::whole).is_none() {
+                return true;
+            }
+            step = metrics.after(k);
+        }
+        false
+    }
+
+    /// Walks the run again from a recorded frame to the next.
+    fn walk(&mut self, recording: &Recording, from: Frame, to: &Frame) -> Result<(), ConvertError> {
+        let start = from.step;
+        let packing = recording.packing(&from)?;
+        let mut run = Relaxation::resume(recording.scene(), packing, from)?;
+        loop {
+            run.advance()?;
+            if run.step() == to.step {
+                break;
+            }
+            self.rebuilt += 1;
+            if let Some(snapshot) = Snapshot::of(&run, &self.channels, false) {
+                self.writer.send(snapshot)?;
+            }
+        }
+        if run.frame().digest() == to.digest() {
+            Ok(())
+        } else {
+            Err(ConvertError::Differs {
+                path: recording.path().to_owned(),
+                from: start,
+                step: to.step,
+            })
+        }
+    }
+
+    /// Writes a recorded frame and its metrics.
+    fn write_frame(
+        &mut self,
+        recording: &Recording,
+        frame: &Frame,
+        last: bool,
+    ) -> Result<(), ConvertError> {
+        let step = frame.step;
+        let edge = last || step == self.first;
+        let [contours, contacts, metrics, state] = self.channels.at(step, edge);
+        let row = self.waiting.get(&step).and_then(Row::whole);
+        let metrics = match (metrics, row) {
+            (false, _) => None,
+            (true, Some(recorded)) => Some(recorded),
+            (true, None) => {
+                let packing = recording.packing(frame)?;
+                let run = Relaxation::resume(recording.scene(), packing, frame.clone())?;
+                Some(run.observables().metrics())
+            }
+        };
+        let pictured = contours || contacts || state;
+        if pictured || metrics.is_some() {
+            self.writer.send(Snapshot {
+                step,
+                nanoseconds: nanoseconds(frame.minimizer.time),
+                metrics,
+                frame: pictured.then(|| frame.clone()),
+                contours,
+                contacts,
+                state,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the metrics of a step that has no recorded frame.
+    fn write_row(&mut self, step: u64, row: Row) -> Result<(), ConvertError> {
+        let metrics = row.whole().filter(|_| self.channels.metrics.includes(step));
+        if metrics.is_some() {
+            self.writer.send(Snapshot {
+                step,
+                nanoseconds: row.nanoseconds,
+                metrics,
+                frame: None,
+                contours: false,
+                contacts: false,
+                state: false,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the metrics that are whole, where there are no states to wait for.
+    fn write_whole_rows(&mut self) -> Result<(), ConvertError> {
+        while let Some(entry) = self.waiting.first_entry()
+            && let Some(metrics) = entry.get().whole()
+        {
+            let (step, row) = entry.remove_entry();
+            self.writer.send(Snapshot {
+                step,
+                nanoseconds: row.nanoseconds,
+                metrics: Some(metrics),
+                frame: None,
+                contours: false,
+                contacts: false,
+                state: false,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The last frame, and the end of the file.
+    fn end(
+        mut self,
+        recording: &Recording,
+        damage: Option<ReadError>,
+    ) -> Result<Converted, ConvertError> {
+        if let Some(frame) = self.last.take() {
+            // The last recorded frame of a file that breaks off is only the last if it is not on the schedule.
+            self.write_frame(recording, &frame, true)?;
+        }
+        let outcome = recording.outcome();
+        let written = self.writer.finish(outcome)?;
+        match damage {
+            Some(error) => Err(error.into()),
+            None => Ok(Converted {
+                outcome,
+                written,
+                rebuilt: self.rebuilt,
+            }),
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`.
+//!
+//! A figure is SVG text; [`write()`] makes a PNG of it where the file's name asks for one, with a font of its own, so that
+//! a picture is the same on every machine.
+//!
+//! ```
+//! use softjam::{figure::{Style, packing}, relax::Relaxation, scene::Scene};
+//!
+//! let scene = Scene { particles: 32, phi: 0.95, ..Scene::default() };
+//! let run = Relaxation::new(&scene).unwrap();
+//! let svg = packing(run.packing(), &run.frame(), scene.line_tension, &Style::default());
+//! assert!(svg.starts_with("<svg"));
+//! let path = std::env::temp_dir().join("softjam-figure-example.png");
+//! softjam::figure::write(&path, &svg).unwrap();
+//! # std::fs::remove_file(&path).unwrap();
+//! ```
+
+mod packing;
+mod relaxation;
+
+pub use packing::{ColorBy, Shape, Style, packing};
+pub use relaxation::{Fall, relaxation};
+
+use resvg::tiny_skia::{Color, Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+use std::path::Path;
+
+/// The typeface of all figures.
+const FONT: &str = "DejaVu Sans";
+
+/// Pixels of a PNG for each unit of the SVG.
+const PIXELS: f32 = 2.0;
+
+/// Why a figure could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FigureError {
+    /// The file's name ends in neither `.svg` nor `.png`.
+    #[error("{path}: a figure's name ends in .svg or .png")]
+    Name {
+        /// Path of the file.
+        path: String,
+    },
+    /// The file could not be written.
+    #[error("cannot write {path}: {source}")]
+    Write {
+        /// Path of the file.
+        path: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The picture could not be drawn.
+    #[error("the figure cannot be drawn: {0}")]
+    Draw(String),
+    /// There is nothing to draw.
+    #[error("{0}")]
+    Nothing(String),
+}
+
+/// Whether `path` names a figure that can be written.
+///
+/// # Errors
+///
+/// [`FigureError::Name`] if it ends in neither `.svg` nor `.png`.
+///
+/// ```
+/// assert!(softjam::figure::check_name("packing.svg").is_ok());
+/// assert!(softjam::figure::check_name("packing.gif").is_err());
+/// ```
+pub fn check_name(path: impl AsRef<Path>) -> Result<(), FigureError> {
+    is_png(path.as_ref()).map(drop)
+}
+
+fn is_png(path: &Path) -> Result<bool, FigureError> {
+    let named = |e: &str| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e));
+    match (named("svg"), named("png")) {
+        (true, _) => Ok(false),
+        (_, true) => Ok(true),
+        _ => Err(FigureError::Name {
+            path: path.display().to_string(),
+        }),
+    }
+}
+
+/// Writes a figure as its name says, `.svg` or `.png`.
+///
+/// # Errors
+///
+/// [`FigureError`].
+///
+/// See the example of the [module](self).
+pub fn write(path: impl AsRef<Path>, svg: &str) -> Result<(), FigureError> {
+    let path = path.as_ref();
+    let bytes = if is_png(path)? {
+        png(svg)?
+    } else {
+        svg.as_bytes().to_vec()
+    };
+    std::fs::write(path, bytes).map_err(|source| FigureError::Write {
+        path: path.display().to_string(),
+        source,
+    })
+}
+
+/// A figure as PNG.
+///
+/// # Errors
+///
+/// [`FigureError::Draw`] if `svg` is no picture.
+///
+/// ```
+/// let png = softjam::figure::png("<svg xmlns='http://www.w3.org/2000/svg' width='10' height='10'/>").unwrap();
+/// assert!(png.starts_with(b"\x89PNG"));
+/// ```
+pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
+    let mut options = Options {
+        font_family: FONT.to_owned(),
+        ..Options::default()
+    };
+    let fonts = options.fontdb_mut();
+    for font in [dejavu::sans::regular(), dejavu::sans::oblique()] {
+        fonts.load_font_data(font.to_vec());
+    }
+    fonts.set_sans_serif_family(FONT);
+    let draw = |e: &dyn std::fmt::Display| FigureError::Draw(e.to_string());
+    let tree = Tree::from_str(svg, &options).map_err(|e| draw(&e))?;
+    let size = tree.size().to_int_size().scale_by(PIXELS);
+    let pixels = size.and_then(|size| Pixmap::new(size.width(), size.height()));
+    let mut pixels = pixels.ok_or_else(|| draw(&"it has no size"))?;
+    pixels.fill(Color::WHITE);
+    resvg::render(
+        &tree,
+        Transform::from_scale(PIXELS, PIXELS),
+        &mut pixels.as_mut(),
+    );
+    pixels.encode_png().map_err(|e| draw(&e))
+}
+
+/// A number as `9.6·10⁻¹¹`.
+fn power_of_ten(x: f64) -> String {
+    let text = format!("{x:.1e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{digits}·10{}", superscript(exponent)),
+        None => text,
+    }
+}
+
+/// A power of ten.
+fn decade(k: i32) -> String {
+    format!("10{}", superscript(&k.to_string()))
+}
+
+/// `f_max` in SVG as it is printed, in a text of the given font size.
+fn f_max(size: u32) -> String {
+    let (small, down) = (7 * size / 10, size / 5);
+    format!(
+        "<tspan font-style=\"italic\">f</tspan><tspan font-size=\"{small}\" dy=\"{down}\">max</tspan><tspan dy=\"-{down}\">\u{2009}</tspan>"
+    )
+}
+
+/// A whole number as an exponent.
+fn superscript(text: &str) -> String {
+    let raised = |c| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
+    };
+    text.chars().map(raised).collect()
+}

@@ -1,0 +1,104 @@
+//! What a recording says of itself before its first frame.
+
+use super::not_rrd;
+use super::stream::{Message, Stream};
+use crate::domain::Domain;
+use crate::record::recording_id;
+use crate::replay::ReadError;
+use crate::replay::source::{Header, check_version, guarded, particles, read_scene};
+use crate::scene::Scene;
+use rerun::external::re_log_types::StoreId;
+use rerun::log::Chunk;
+
+/// What `/scene` holds.
+struct About {
+    scene: Scene,
+    program: String,
+    from_step: u64,
+}
+
+/// Reads messages until scene and radii are known.
+pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header), ReadError> {
+    let missing = |missing| ReadError::NotSoftjam {
+        path: path.to_owned(),
+        missing,
+    };
+    let mut about = None;
+    loop {
+        let message = stream.next().map_err(|problem| not_rrd(path, problem))?;
+        let Some(message) = message else {
+            return Err(missing(if about.is_some() { "radii" } else { "scene" }));
+        };
+        let Message::Chunk(store, chunk) = message else {
+            continue;
+        };
+        let damaged = |problem| not_rrd(path, problem);
+        match chunk.entity_path().to_string().as_str() {
+            "/scene" => {
+                let read = guarded(|| Ok(read_about(path, &chunk)));
+                about = read.map_err(damaged)??.or(about);
+            }
+            "/particles" => {
+                let About {
+                    scene,
+                    program,
+                    from_step,
+                } = about.ok_or(missing("scene"))?;
+                let id = recording_id(&scene);
+                if store.recording_id().as_str() != id {
+                    return Err(ReadError::Changed {
+                        path: path.to_owned(),
+                        found: store.recording_id().as_str().to_owned(),
+                        expected: id,
+                    });
+                }
+                let read = guarded(|| Ok(read_particles(&chunk)));
+                let (radii, domain) = read.map_err(damaged)?.map_err(missing)?;
+                let header = Header {
+                    scene,
+                    radii,
+                    domain,
+                    program,
+                    from_step,
+                };
+                return Ok((store, header));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
+    let text = |name: &'static str| {
+        let mut texts = chunk.iter_slices::<String>(name.into());
+        texts
+            .next()
+            .and_then(|list| list.first().map(ToString::to_string))
+    };
+    let mut versions = chunk.iter_slices::<u32>("softjam.Scene:format_version".into());
+    if let Some(&[found]) = versions.next() {
+        check_version(path, found)?;
+    }
+    let Some(toml) = text("softjam.Scene:toml") else {
+        return Ok(None);
+    };
+    let scene = read_scene(path, &toml)?;
+    let mut from_steps = chunk.iter_slices::<u64>("softjam.Scene:from_step".into());
+    Ok(Some(About {
+        scene,
+        program: text("softjam.Scene:program").unwrap_or_default(),
+        from_step: from_steps
+            .next()
+            .and_then(|l| l.first().copied())
+            .unwrap_or(0),
+    }))
+}
+
+fn read_particles(chunk: &Chunk) -> Result<(Vec<f64>, Domain), &'static str> {
+    let list = |name: &'static str| {
+        let mut lists = chunk.iter_slices::<f64>(name.into());
+        lists.next().map(<[f64]>::to_vec)
+    };
+    let radii = list("softjam.Particles:radius").ok_or("radii")?;
+    particles(radii, list("softjam.Particles:box"))
+}

@@ -1,0 +1,180 @@
+//! Reading `.rrd` files: which entity gives what.
+
+mod header;
+mod stream;
+
+use super::ReadError;
+use super::source::{Ending, Header, Item, Problem, Source, guarded};
+use crate::domain::Vec2;
+use crate::force::METRICS;
+use crate::frame::Frame;
+use crate::record::Outcome;
+use crate::relax::fire::FireState;
+use rerun::external::re_log_types::StoreId;
+use rerun::log::Chunk;
+use rerun::{Scalars, TimelineName};
+use std::io::Read;
+use stream::{Message, Stream};
+
+/// What an `.rrd` file begins with.
+pub(super) const MAGIC: &[u8] = &rerun::external::re_log_encoding::rrd::RRD_FOURCC;
+
+/// An `.rrd` file that is being read.
+pub(super) struct RrdSource {
+    stream: Stream,
+    store: StoreId,
+}
+
+impl RrdSource {
+    /// Reads up to the first frame of a source of `length` bytes.
+    pub fn open(
+        path: &str,
+        source: Box<dyn Read + Send>,
+        length: u64,
+    ) -> Result<(Self, Header), ReadError> {
+        let mut stream = Stream::open(source, length).map_err(|problem| not_rrd(path, problem))?;
+        let (store, header) = header::read(path, &mut stream)?;
+        Ok((Self { stream, store }, header))
+    }
+}
+
+fn not_rrd(path: &str, problem: String) -> ReadError {
+    ReadError::Format {
+        path: path.to_owned(),
+        format: "a rerun recording",
+        problem,
+    }
+}
+
+impl Source for RrdSource {
+    fn read_on(&mut self, items: &mut Vec<Item>) -> Result<bool, Problem> {
+        let Some(message) = self.stream.next()? else {
+            return Ok(false);
+        };
+        match message {
+            Message::Opens => return Err(Problem::Several),
+            Message::Layout => {}
+            Message::Chunk(store, chunk) => {
+                if store != self.store {
+                    let problem = format!("rows of another recording, {store:?}");
+                    return Err(Problem::Damage(problem));
+                }
+                guarded(|| take_apart(&chunk, items))?;
+            }
+        }
+        Ok(true)
+    }
+
+    fn ending(&self) -> Option<Ending> {
+        self.stream.ending()
+    }
+}
+
+/// Takes the rows of an entity apart.
+fn take_apart(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
+    let entity = chunk.entity_path().to_string();
+    match entity.as_str() {
+        "/state" => read_states(chunk, items)?,
+        "/result" => items.push(read_result(chunk).ok_or("its result is not whole")?),
+        "/world/contours" | "/world/contacts" if !chunk.is_static() => {
+            let channel = if entity == "/world/contours" {
+                "contours"
+            } else {
+                "contacts"
+            };
+            items.extend(steps(chunk).map(|step| Item::Drawn { channel, step }));
+        }
+        _ => {
+            let name = entity.strip_prefix("/metrics/");
+            if let Some(name) = METRICS.into_iter().find(|known| Some(*known) == name) {
+                let values = chunk.iter_slices::<f64>(Scalars::descriptor_scalars().component);
+                let rows = steps(chunk).zip(times(chunk)).zip(values);
+                items.extend(rows.filter_map(|((step, nanoseconds), value)| {
+                    let &[value] = value else { return None };
+                    Some(Item::Metric {
+                        name,
+                        step,
+                        nanoseconds,
+                        value,
+                    })
+                }));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
+    let vectors = |name: &'static str| {
+        chunk
+            .iter_slices::<[f64; 2]>(name.into())
+            .map(|list| list.iter().map(|&[x, y]| Vec2::new(x, y)).collect())
+            .collect::<Vec<Vec<Vec2>>>()
+    };
+    let numbers = |name: &'static str| {
+        chunk
+            .iter_slices::<f64>(name.into())
+            .map(<[f64]>::to_vec)
+            .collect::<Vec<_>>()
+    };
+    let mut positions = vectors("softjam.State:position").into_iter();
+    let mut velocities = vectors("softjam.State:velocity").into_iter();
+    let mut contacts = chunk
+        .iter_slices::<[u32; 2]>("softjam.State:contact".into())
+        .map(<[[u32; 2]]>::to_vec);
+    let mut forces = numbers("softjam.State:force").into_iter();
+    let mut minimizers = numbers("softjam.State:minimizer").into_iter();
+    let mut digests = chunk
+        .iter_slices::<u8>("softjam.State:digest".into())
+        .map(<[u8]>::to_vec);
+    for step in steps(chunk) {
+        let missing = |what| format!("no {what} at step {step}");
+        let minimizer = minimizers
+            .next()
+            .and_then(|values| FireState::from_values(&values))
+            .ok_or_else(|| missing("minimiser state"))?;
+        let frame = Frame {
+            step,
+            positions: positions.next().ok_or_else(|| missing("positions"))?,
+            velocities: velocities.next().ok_or_else(|| missing("velocities"))?,
+            contacts: contacts.next().ok_or_else(|| missing("contacts"))?,
+            forces: forces.next().ok_or_else(|| missing("forces"))?,
+            minimizer,
+        };
+        let digest = digests.next().ok_or_else(|| missing("digest"))?;
+        items.push(Item::State(frame, digest));
+    }
+    Ok(())
+}
+
+fn read_result(chunk: &Chunk) -> Option<Item> {
+    let converged = chunk
+        .iter_slices::<bool>("softjam.Result:converged".into())
+        .next()
+        .and_then(|list| list.iter().next())?;
+    let mut steps = chunk.iter_slices::<u64>("softjam.Result:steps".into());
+    let mut f_max = chunk.iter_slices::<f64>("softjam.Result:f_max".into());
+    let mut digest = chunk.iter_slices::<u8>("softjam.Result:digest".into());
+    let outcome = Outcome {
+        converged,
+        steps: steps.next()?.first().copied()?,
+        f_max: f_max.next()?.first().copied()?,
+    };
+    Some(Item::Result(outcome, digest.next()?.try_into().ok()?))
+}
+
+/// The times of a chunk's rows on one of its timelines; nothing if it has no such timeline.
+fn on(chunk: &Chunk, timeline: &'static str) -> std::vec::IntoIter<i64> {
+    let timeline: TimelineName = timeline.into();
+    let times = chunk.iter_indices(&timeline).map(|(time, _)| time.as_i64());
+    times.collect::<Vec<_>>().into_iter()
+}
+
+fn steps(chunk: &Chunk) -> impl Iterator<Item = u64> {
+    on(chunk, "step").map(|step| u64::try_from(step).unwrap_or(0))
+}
+
+/// Simulated times in nanoseconds; 0 where there are none.
+fn times(chunk: &Chunk) -> impl Iterator<Item = i64> {
+    on(chunk, "sim_time").chain(core::iter::repeat(0))
+}

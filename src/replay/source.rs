@@ -1,0 +1,130 @@
+//! What a recording gives before it is checked, whatever its format.
+
+use super::ReadError;
+use crate::domain::Domain;
+use crate::frame::Frame;
+use crate::record::{FORMAT_VERSION, Outcome};
+use crate::scene::Scene;
+use std::cell::Cell;
+use std::panic::AssertUnwindSafe;
+
+/// A file that is being read: its header has been, the rest comes in pieces.
+pub(super) trait Source: Send {
+    /// Reads on and appends what was found; `false` at the end.
+    fn read_on(&mut self, items: &mut Vec<Item>) -> Result<bool, Problem>;
+
+    /// How the file ended; `None` before its end.
+    fn ending(&self) -> Option<Ending>;
+}
+
+/// Something that was found.
+pub(super) enum Item {
+    /// A state with the digest that was recorded with it.
+    State(Frame, Vec<u8>),
+    /// A scalar.
+    Metric {
+        name: &'static str,
+        step: u64,
+        nanoseconds: i64,
+        value: f64,
+    },
+    /// Contours or contacts of a step.
+    Drawn { channel: &'static str, step: u64 },
+    /// How the run ended.
+    Result(Outcome, [u8; 32]),
+}
+
+/// Why reading cannot go on.
+pub(super) enum Problem {
+    /// The file is damaged.
+    Damage(String),
+    /// Another recording follows in the same file.
+    Several,
+}
+
+impl From<String> for Problem {
+    fn from(problem: String) -> Self {
+        Self::Damage(problem)
+    }
+}
+
+/// How a file ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// As its writer meant it.
+    Closed,
+    /// It breaks off.
+    BreaksOff,
+}
+
+/// What a file says of itself before its first frame.
+pub(super) struct Header {
+    pub scene: Scene,
+    pub radii: Vec<f64>,
+    pub domain: Domain,
+    pub program: String,
+    /// The step that the recording begins with; not 0 if its run went on from another recording.
+    pub from_step: u64,
+}
+
+/// Refuses a layout that was made after this program.
+pub(super) fn check_version(path: &str, found: u32) -> Result<(), ReadError> {
+    if found > FORMAT_VERSION {
+        return Err(ReadError::Newer {
+            path: path.to_owned(),
+            found,
+            known: FORMAT_VERSION,
+        });
+    }
+    Ok(())
+}
+
+/// The scene in a file.
+pub(super) fn read_scene(path: &str, toml: &str) -> Result<Scene, ReadError> {
+    Scene::from_toml(toml).map_err(|source| ReadError::Scene {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Radii and box, or what is missing of them.
+pub(super) fn particles(
+    radii: Vec<f64>,
+    sides: Option<Vec<f64>>,
+) -> Result<(Vec<f64>, Domain), &'static str> {
+    if radii.is_empty() || radii.iter().any(|r| !(r.is_finite() && *r > 0.0)) {
+        return Err("radii that are positive and finite");
+    }
+    let domain = match *sides.ok_or("box")? {
+        [x, y] => Domain::new(x, y),
+        _ => None,
+    };
+    Ok((radii, domain.ok_or("box of two positive sides")?))
+}
+
+thread_local! {
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs the decoding of somebody else's bytes. Decoders panic at some that are damaged; here that is an error like others.
+pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    let before = GUARDED.replace(true);
+    let result = std::panic::catch_unwind(AssertUnwindSafe(decode));
+    GUARDED.set(before);
+    result.unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+        Err(text.unwrap_or("it cannot be decoded").to_owned())
+    })
+}
+
+/// Whether a panic on this thread would only mean that a file is damaged, and is turned into a
+/// [`ReadError`](super::ReadError): what a program's panic hook may want to know, to keep quiet.
+///
+/// ```
+/// assert!(!softjam::replay::reading_damaged_bytes());
+/// ```
+#[must_use]
+pub fn reading_damaged_bytes() -> bool {
+    GUARDED.get()
+}
