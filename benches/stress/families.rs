@@ -4,6 +4,18 @@ use super::hand_made;
 use super::outcome::{Outcome, of_scene, pressure_of};
 use super::random::Random;
 use softjam::scene::{Radii, Scene, Species};
+use std::sync::OnceLock;
+
+/// What all scenes have in common; by default the default scene.
+pub static COMMON: OnceLock<Scene> = OnceLock::new();
+
+/// The same as lines of a scene file.
+pub static COMMON_LINES: OnceLock<String> = OnceLock::new();
+
+/// The scene that all cases start from.
+pub fn common() -> Scene {
+    COMMON.get().cloned().unwrap_or_default()
+}
 
 /// A case: its name, and how to run it.
 pub type Case = (String, Box<dyn FnOnce() -> Outcome>);
@@ -113,7 +125,7 @@ fn random() -> Vec<Case> {
                 phi,
                 radii,
                 seed: k,
-                ..Scene::default()
+                ..common()
             };
             case(format!("seed {k}, φ = {phi:.4}, ratio {ratio:.2}"), scene)
         })
@@ -129,7 +141,7 @@ fn few() -> Vec<Case> {
                     particles,
                     phi,
                     seed,
-                    ..Scene::default()
+                    ..common()
                 };
                 cases.push(case(
                     format!("N = {particles}, φ = {phi}, seed {seed}"),
@@ -152,7 +164,7 @@ fn dense(dt_max: Option<f64>) -> Vec<Case> {
                     seed,
                     dt_max,
                     steps: 20_000,
-                    ..Scene::default()
+                    ..common()
                 };
                 cases.push(case(
                     format!("N = {particles}, φ = {phi}, seed {seed}"),
@@ -168,7 +180,7 @@ fn large() -> Vec<Case> {
     let mut scene = Scene {
         particles: 100_000,
         steps: 100,
-        ..Scene::default()
+        ..common()
     };
     scene.disks.steps = 300;
     vec![case("N = 100000".into(), scene)]
@@ -188,7 +200,7 @@ pub fn jamming_of(particles: usize, seed: u64) -> Vec<Case> {
         particles,
         phi,
         seed,
-        ..Scene::default()
+        ..common()
     };
     // From random starts jammed and unjammed coverages interleave; bisection ends at one of the borders.
     let (mut loose, mut jammed) = (0.80, 0.88);
@@ -288,8 +300,11 @@ fn extremes() -> Vec<Case> {
         .into_iter()
         .map(|line| {
             let name = line.replace('\n', ", ");
-            let text = ["particles = 64", "phi = 0.9"]
+            let text = COMMON_LINES
+                .get()
+                .map(String::as_str)
                 .into_iter()
+                .chain(["particles = 64", "phi = 0.9"])
                 .filter(|default| {
                     let field = default.split(' ').next().unwrap_or_default();
                     !line.lines().any(|l| l.starts_with(field))

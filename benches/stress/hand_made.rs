@@ -1,6 +1,6 @@
 //! Packings that no random start gives.
 
-use super::families::Case;
+use super::families::{Case, common};
 use super::outcome::of_packing;
 use super::random::Random;
 use softjam::contact::ContactLaw;
@@ -11,10 +11,7 @@ use softjam::scene::{Radii, Scene, Species, Start};
 use std::f64::consts::PI;
 
 fn case(name: String, packing: Packing) -> Case {
-    (
-        name,
-        Box::new(move || of_packing(&Scene::default(), &packing)),
-    )
+    (name, Box::new(move || of_packing(&common(), &packing)))
 }
 
 /// A packing of `(x, y, radius)` in a box; the numbers are the program's own, so it exists.
@@ -219,7 +216,7 @@ fn hexagonal(phi: f64, mixed: bool) -> Scene {
         phi,
         radii: if mixed { Radii::default() } else { one },
         start: Start::Hexagonal,
-        ..Scene::default()
+        ..common()
     }
 }
 

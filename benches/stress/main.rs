@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo bench --no-default-features --bench stress -- --write docs/stress.md   # everything, and the report
 //! cargo bench --no-default-features --bench stress -- lattice threshold        # some families
+//! cargo bench --no-default-features --bench stress -- --set 'minimizer = "fire+newton"' --set 'forces = "gradient"'
 //! ```
 //!
 //! Every case has to end converged, at its step limit or with a named error, and what it says must be true: the contact
@@ -27,21 +28,34 @@ mod report;
 mod verify;
 
 use report::Row;
+use softjam::scene::Scene;
 use std::process::ExitCode;
 use std::time::Instant;
 
 fn main() -> ExitCode {
     let mut only: Vec<String> = Vec::new();
-    let mut file = None;
+    let (mut file, mut lines) = (None, String::new());
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             // What `cargo bench` passes on to every bench.
             "--bench" => {}
             "--write" => file = arguments.next(),
+            "--set" => {
+                lines.push_str(&arguments.next().unwrap_or_default());
+                lines.push('\n');
+            }
             _ => only.push(argument),
         }
     }
+    match Scene::from_toml(&lines) {
+        Ok(scene) => families::COMMON.get_or_init(|| scene),
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    families::COMMON_LINES.get_or_init(|| lines.clone());
     // A panic is counted, not printed.
     std::panic::set_hook(Box::new(|_| {}));
     let mut rows = Vec::new();
@@ -67,7 +81,7 @@ fn main() -> ExitCode {
         eprintln!("  {}", row.line());
         rows.push(row);
     }
-    let text = report::markdown(&rows);
+    let text = report::markdown(&rows, &lines);
     match file {
         None => println!("{text}"),
         Some(path) => {

@@ -97,6 +97,7 @@ fn check(scene: &Scene, packing: &Packing, contacts: softjam::contact::Contacts<
         pairs: contacts.pairs,
         forces: contacts.forces,
         line_tension: scene.line_tension,
+        gradient: scene.to_toml().contains("\nforces = \"gradient\""),
     }
     .check()
 }

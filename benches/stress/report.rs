@@ -107,8 +107,11 @@ fn shortened(text: &str) -> String {
 }
 
 /// The whole report.
-pub fn markdown(rows: &[Row]) -> String {
+pub fn markdown(rows: &[Row], lines: &str) -> String {
     let mut text = String::from(HEAD);
+    if !lines.is_empty() {
+        let _ = writeln!(text, "All scenes with:\n\n```toml\n{lines}```\n");
+    }
     let cases: usize = rows.iter().map(|r| r.cases).sum();
     let wrong: usize = rows.iter().map(|r| r.wrong.len()).sum();
     let seconds: f64 = rows.iter().map(|r| r.seconds).sum();

@@ -15,6 +15,8 @@ pub struct Answer<'a> {
     pub pairs: &'a [[u32; 2]],
     pub forces: &'a [f64],
     pub line_tension: f64,
+    /// Whether the net forces are those of the gradient form, −∇U.
+    pub gradient: bool,
 }
 
 /// How far an answer is from what it ought to be.
@@ -46,6 +48,15 @@ pub struct Check {
 fn g(theta: f64) -> f64 {
     let t = theta.rem_euclid(2.0 * PI);
     (PI - t) * t.sin() - 0.5 * t.cos() - 1.0
+}
+
+/// Its derivative, odd; the two slopes of the cusp at 0 cancel.
+fn slope(theta: f64) -> f64 {
+    let t = theta.rem_euclid(2.0 * PI);
+    if t == 0.0 {
+        return 0.0;
+    }
+    (PI - t) * t.cos() - 0.5 * t.sin()
 }
 
 /// The largest g is 0.64076.
@@ -81,6 +92,22 @@ impl Answer<'_> {
                 net[j][k] -= f * unit[k];
             }
             overlap = overlap.max((self.radii[i] + self.radii[j] - r).abs());
+        }
+        if self.gradient {
+            // U(r) = max over f of δᵀf − ½ fᵀA f: at fixed f, A changes with the direction θ of each contact only, and a contact
+            // turns by dθ = t·(dr_j − dr_i)/r, t a quarter turn ahead of the direction from i to j.
+            for &(i, j, d, f) in &contacts {
+                let torque = |p: usize, angle: f64| -> f64 {
+                    let sum: f64 = around[p].iter().map(|(a, k)| k * slope(angle - a)).sum();
+                    self.radii[p] / (2.0 * PI) * f * sum
+                };
+                let (angle, r) = (toward(d), d[0].hypot(d[1]));
+                let per_length = (torque(i, angle) + torque(j, away(d))) / r;
+                for (k, t) in [-angle.sin(), angle.cos()].into_iter().enumerate() {
+                    net[i][k] += per_length * t;
+                    net[j][k] -= per_length * t;
+                }
+            }
         }
         let contour = |p: usize, angle: f64| {
             let sum: f64 = around[p].iter().map(|(a, f)| f * g(angle - a)).sum();

@@ -128,6 +128,7 @@ fn second_images_are_found_beyond_the_bound_of_the_bulges() {
             pairs: contacts.pairs,
             forces: contacts.forces,
             line_tension: 1.0,
+            gradient: false,
         };
         let check = answer.check();
         assert!(check.second_image == 0.0 && check.law < 1e-13 && check.finite);
