@@ -97,28 +97,36 @@ impl Axis {
     }
 }
 
-/// `m · 10^k` as it is written on an axis.
+/// `m · 10^k` as it is written on an axis: plain, or a power of ten whose exponent follows a `^`.
 fn power(k: i32, m: f64) -> String {
     if (-2..=2).contains(&k) {
-        return format!("{:.*}", (-k).max(0) as usize, m * 10f64.powi(k));
-    }
-    let digits: String = k
-        .to_string()
-        .chars()
-        .map(|c| match c {
-            '-' => '⁻',
-            '1' => '¹',
-            '2' => '²',
-            '3' => '³',
-            '0' => '⁰',
-            other => char::from_u32(0x2070 + other as u32 - '0' as u32).unwrap_or(other),
-        })
-        .collect();
-    if m == 1.0 {
-        format!("10{digits}")
+        format!("{:.*}", (-k).max(0) as usize, m * 10f64.powi(k))
+    } else if m == 1.0 {
+        format!("10^{k}").replace('-', "−")
     } else {
-        format!("{m} · 10{digits}")
+        format!("{m} · 10^{k}").replace('-', "−")
     }
+}
+
+/// A label of an axis; an exponent is a text of its own, which every renderer places alike.
+fn tick(s: &mut String, (x, y): (f64, f64), anchor: &str, label: &str) {
+    let Some((base, exponent)) = label.split_once('^') else {
+        text(s, (x, y), anchor, label);
+        return;
+    };
+    let width = 6.6 * exponent.chars().count() as f64;
+    let between = if anchor == "end" {
+        x - width
+    } else {
+        x + 8.0 - 0.5 * width
+    };
+    text(s, (between, y), "end", base);
+    let _ = writeln!(
+        s,
+        "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"11\" fill=\"{INK}\">{exponent}</text>",
+        between + 0.5,
+        y - 6.0
+    );
 }
 
 /// A panel with axes.
@@ -147,12 +155,12 @@ impl Panel {
         for (value, label) in self.x.ticks() {
             let x = at(value, self.y.range.0).0;
             line(&mut s, (x, top), (x, top + height), GRID);
-            text(&mut s, (x, top + height + 19.0), "middle", &label);
+            tick(&mut s, (x, top + height + 19.0), "middle", &label);
         }
         for (value, label) in self.y.ticks() {
             let y = at(self.x.range.0, value).1;
             line(&mut s, (left, y), (left + width, y), GRID);
-            text(&mut s, (left - 8.0, y + 5.0), "end", &label);
+            tick(&mut s, (left - 8.0, y + 5.0), "end", &label);
         }
         frame(&mut s, &self.x.label, Some(&self.y.label));
         let inside = |(x, y): (f64, f64)| {
@@ -204,16 +212,16 @@ impl Bars {
         let mut s = title(&self.title);
         let x = |value: f64| left + width * value / self.most;
         let pitch = height / self.rows.len().max(1) as f64;
-        let (mut tick, every) = (0.0, if self.most > 4.0 { 2.0 } else { 0.5 });
-        while tick <= self.most {
+        let (mut at, every) = (0.0, if self.most > 4.0 { 2.0 } else { 0.5 });
+        while at <= self.most {
             text(
                 &mut s,
-                (x(tick), top + height + 19.0),
+                (x(at), top + height + 19.0),
                 "middle",
-                &format!("{tick:.1}"),
+                &format!("{at:.1}"),
             );
-            line(&mut s, (x(tick), top), (x(tick), top + height), GRID);
-            tick += every;
+            line(&mut s, (x(at), top), (x(at), top + height), GRID);
+            at += every;
         }
         for (k, (name, value, remark)) in self.rows.iter().enumerate() {
             let y = top + pitch * (k as f64 + 0.16);
@@ -225,7 +233,13 @@ impl Bars {
             );
             let middle = y + 0.34 * pitch + 5.0;
             text(&mut s, (left - 6.0, middle), "end", name);
-            text(&mut s, (left + 8.0, middle), "start", remark);
+            // Behind a short bar, in a long one.
+            let behind = if *value < 0.55 * self.most {
+                x(*value)
+            } else {
+                left
+            };
+            text(&mut s, (behind + 8.0, middle), "start", remark);
         }
         frame(&mut s, &self.label, None);
         if let Some((value, note)) = &self.limit {

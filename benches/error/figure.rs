@@ -194,7 +194,7 @@ fn model(table: &Table) -> String {
             Line::Dashed,
         ),
     ];
-    notes.push((1.9e-3, 0.112, "10 %".into()));
+    notes.push((1.1, 0.107, "10 %".into()));
     Panel {
         title: "c  Error of the model itself".into(),
         x: Axis::log("squeeze Σf / 2πγ", (1e-3, 1.0)),
@@ -242,7 +242,7 @@ fn size(table: &Table) -> String {
         title: "d  Cost of a step".into(),
         x: Axis::log("particles N", (10.0, 1e5)),
         y: Axis::log("µs per step and particle", y),
-        legend: (0.34, 0.42),
+        legend: (0.04, 0.08),
         notes: Vec::new(),
         series,
     }
@@ -267,7 +267,7 @@ fn recording(table: &Table) -> String {
         Some((
             name.into(),
             slow,
-            format!("{rate:.0} steps/s, {:.1} kB/step", bytes / 1e3),
+            format!("{rate:.0}/s, {:.1} kB", bytes / 1e3),
         ))
     })
     .collect();
@@ -278,7 +278,7 @@ fn recording(table: &Table) -> String {
         .unwrap_or_default();
     Bars {
         title: format!("e  Recording every step, N = {n}"),
-        label: "time of a step / without recording".into(),
+        label: "time of a step / without recording (steps/s, size)".into(),
         most: bars
             .iter()
             .fold(1.5, |m: f64, b| m.max((2.0 * b.1).ceil() / 2.0)),
