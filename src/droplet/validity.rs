@@ -120,7 +120,7 @@ impl Validity {
     /// assert_eq!(
     ///     strained.warning().unwrap(),
     ///     "40 of 64 particles are squeezed beyond the range of the linear model (Σf/2πγ up to 0.210, mean 0.080, limit 0.0659): \
-    ///      its own forces are too small there by more than 10 %, by up to 29 %"
+    ///      its own forces are too small there by more than 10 %, by up to 33 %"
     /// );
     /// ```
     #[must_use]
