@@ -103,7 +103,8 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
 }
 
 /// `dt_max √k` of the stiffest pair. The triangular lattice has `ω_max² = 6 k`, so that 2/√6 = 0.82 is the limit of
-/// stability of the densest contact network; half of it keeps clear, the whole multiplies the steps by five.
+/// stability of the densest contact network; half of it keeps clear, the whole multiplies the steps by five. Mean steps to
+/// 1e-6 at N = 1024, φ = 0.86: 4484 with 0.41 and 4589 with 0.5 (18 seeds); from 0.65 on several times as many.
 const DT_MAX: f64 = 0.41;
 
 /// How far the neighbour list reaches beyond the disks, in units of the largest radius.

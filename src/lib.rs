@@ -87,3 +87,4 @@ pub mod relax;
 #[cfg(feature = "recording")]
 pub mod replay;
 pub mod scene;
+mod simplicial;

@@ -47,6 +47,14 @@ pub struct SceneFlags {
     #[arg(long, value_name = "STEPS", allow_negative_numbers = true, help_heading = RELAXATION)]
     steps: Option<i128>,
 
+    /// Minimiser: fire, or fire+newton (FIRE through the rearrangements, then Newton's method).
+    #[arg(long, value_name = "MINIMIZER", value_parser = named::<softjam::scene::Minimizer>, help_heading = RELAXATION)]
+    minimizer: Option<softjam::scene::Minimizer>,
+
+    /// Forces: central (along the lines of centres) or gradient (of the stored energy).
+    #[arg(long, value_name = "FORM", value_parser = named::<softjam::force::Form>, help_heading = RELAXATION)]
+    forces: Option<softjam::force::Form>,
+
     /// Upper bound of the time step; by default from the largest frequency.
     #[arg(long, value_name = "DT", allow_negative_numbers = true, help_heading = RELAXATION)]
     dt_max: Option<f64>,
@@ -130,6 +138,8 @@ impl SceneFlags {
             line_tension: self.line_tension,
             threshold: self.threshold,
             steps: self.steps,
+            minimizer: self.minimizer,
+            forces: self.forces,
             dt_max: self.dt_max,
             contact_rule: self.contact_rule,
             contact_solver: self.contact_solver,

@@ -11,7 +11,7 @@ use softjam::packing::Packing;
 use softjam::record::{self, Format, Header, RecordError, Summary, Writer};
 use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
-use softjam::scene::{Scene, SceneError, SceneFields, Start};
+use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start};
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -69,10 +69,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let scene = origin.scene().clone();
     fits_in_memory(&scene)?;
     let outputs = outputs(arguments, &scene)?;
-    if scene.threshold < scene.contact_tolerance {
+    // Newton's method carries the forces along with the positions; only round-off holds it up.
+    let (least, reason) = match scene.minimizer {
+        Minimizer::Fire => (
+            scene.contact_tolerance,
+            format!("contact_tolerance = {:e} resolves", scene.contact_tolerance),
+        ),
+        Minimizer::FireNewton => (1e-14, "round-off leaves".to_owned()),
+    };
+    if scene.threshold < least {
         warn(&format!(
-            "threshold = {:e} is below what contact_tolerance = {:e} resolves: the run may never converge",
-            scene.threshold, scene.contact_tolerance
+            "threshold = {:e} is below what {reason}: the run may never converge",
+            scene.threshold
         ));
     }
     let phase = Phase::watch_for_signals()?;

@@ -4,6 +4,7 @@
 //! (2006): damped dynamics that turns the velocity towards the force while the power `P = F·v` is positive, and stops
 //! and steps back half a move when it is not. Mass 1; semi-implicit Euler; the mixing comes before the move.
 
+use super::newton::Turns;
 use crate::domain::{Domain, Vec2};
 
 /// FIRE's parameters; the defaults are those of the paper.
@@ -71,9 +72,29 @@ pub struct FireState {
     pub moves: u32,
     /// Simulated time, the sum of the time steps (time).
     pub time: f64,
+    /// How FIRE and Newton's method take turns; nothing but zeros unless Newton's method was tried.
+    pub turns: Turns,
 }
 
 impl FireState {
+    /// The names of the recorded [`values`](Self::values), in their order.
+    ///
+    /// ```
+    /// # use softjam::relax::fire::FireState;
+    /// assert_eq!(FireState::NAMES[1], "dt_max");
+    /// ```
+    pub const NAMES: [&str; 9] = [
+        "dt",
+        "dt_max",
+        "alpha",
+        "downhill",
+        "moves",
+        "time",
+        "newton_moves",
+        "newton_failures",
+        "newton_wait",
+    ];
+
     /// The state at the start of a relaxation with the given bound of the time step.
     ///
     /// ```
@@ -90,28 +111,47 @@ impl FireState {
             downhill: 0,
             moves: 0,
             time: 0.0,
+            turns: Turns::default(),
         }
     }
 
-    /// The state as it is recorded: `dt`, `dt_max`, `alpha`, `downhill`, `moves`, `time`.
+    /// FIRE from rest: time step and mixing as at the start, the counts go on.
+    pub(super) fn restart(&mut self, fire: &Fire) {
+        self.dt = fire.first_dt * self.dt_max;
+        self.alpha = fire.mixing;
+        self.downhill = 0;
+    }
+
+    /// The state as it is recorded: `dt`, `dt_max`, `alpha`, `downhill`, `moves`, `time`; and, once Newton's method was
+    /// tried, the three numbers of its [`Turns`]: `moves`, `failures`, `wait`.
     ///
     /// ```
     /// # use softjam::relax::fire::FireState;
     /// assert_eq!(FireState::default().values(), [0.0; 6]);
     /// ```
     #[must_use]
-    pub fn values(&self) -> [f64; 6] {
-        [
+    pub fn values(&self) -> Vec<f64> {
+        let mut values = vec![
             self.dt,
             self.dt_max,
             self.alpha,
             f64::from(self.downhill),
             f64::from(self.moves),
             self.time,
-        ]
+        ];
+        if self.turns != Turns::default() {
+            let Turns {
+                moves,
+                failures,
+                wait,
+            } = self.turns;
+            values.extend([moves, failures, wait].map(f64::from));
+        }
+        values
     }
 
-    /// The state from its recorded values; `None` if there are not six or a count is not a whole number.
+    /// The state from its recorded values; `None` if there are neither six nor nine, if a count is not a whole
+    /// number, or if the last three are all zero.
     ///
     /// ```
     /// # use softjam::relax::fire::FireState;
@@ -119,12 +159,22 @@ impl FireState {
     /// ```
     #[must_use]
     pub fn from_values(values: &[f64]) -> Option<Self> {
-        let &[dt, dt_max, alpha, downhill, moves, time] = values else {
+        let &[dt, dt_max, alpha, downhill, moves, time, ref rest @ ..] = values else {
             return None;
         };
         let count = |x: f64| {
             let n = x as u32; // saturates; the comparison catches whatever was not a count
             (f64::from(n).to_bits() == x.to_bits()).then_some(n)
+        };
+        let turns = match *rest {
+            [] => Turns::default(),
+            [moves, failures, wait] => Some(Turns {
+                moves: count(moves)?,
+                failures: count(failures)?,
+                wait: count(wait)?,
+            })
+            .filter(|turns| *turns != Turns::default())?,
+            _ => return None,
         };
         Some(Self {
             dt,
@@ -133,6 +183,7 @@ impl FireState {
             downhill: count(downhill)?,
             moves: count(moves)?,
             time,
+            turns,
         })
     }
 }

@@ -21,15 +21,17 @@
 
 pub mod fire;
 pub mod frequency;
+pub mod newton;
 
 use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
-use crate::force::{Observables, largest_force, net_forces};
+use crate::force::{NetForces, Observables, largest_force};
 use crate::frame::{Frame, FrameError};
 use crate::packing::Packing;
-use crate::scene::{Scene, SceneError, start};
+use crate::scene::{Minimizer, Scene, SceneError, start};
 use fire::{Fire, FireState};
+use newton::Newton;
 
 /// How a relaxation stands.
 ///
@@ -109,6 +111,9 @@ pub struct Relaxation {
     step: u64,
     threshold: f64,
     step_limit: u64,
+    form: NetForces,
+    /// What finishes; `None` where FIRE goes all the way.
+    newton: Option<Newton>,
     net: Vec<Vec2>,
     f_max: f64,
     disks: Option<DiskReport>,
@@ -178,6 +183,8 @@ impl Relaxation {
         (step, velocities, state): (u64, Vec<Vec2>, FireState),
     ) -> Self {
         let mut run = Self {
+            form: NetForces::new(scene.forces),
+            newton: (scene.minimizer == Minimizer::FireNewton).then(Newton::default),
             net: vec![Vec2::zeros(); packing.len()],
             packing,
             velocities,
@@ -235,6 +242,11 @@ impl Relaxation {
     /// assert_eq!(run.step(), 1);
     /// ```
     pub fn advance(&mut self) -> Result<(), RelaxError> {
+        if self.finish() {
+            self.step += 1;
+            self.balance();
+            return Ok(());
+        }
         let domain = self.packing.domain();
         self.fire.advance(
             &mut self.state,
@@ -265,6 +277,38 @@ impl Relaxation {
             return Err(RelaxError::Contact { step, source });
         }
         Ok(())
+    }
+
+    /// One step of Newton's method, where it is its turn; `false` if the move is left to FIRE.
+    ///
+    /// After a step that is kept the particles are at rest, and FIRE would start anew.
+    fn finish(&mut self) -> bool {
+        let Some(newton) = &mut self.newton else {
+            return false;
+        };
+        if !Newton::is_due(self.f_max, &self.law) {
+            return false;
+        }
+        let turns = &mut self.state.turns;
+        if turns.wait > 0 {
+            turns.wait -= 1;
+            return false;
+        }
+        let kept = newton.advance(
+            &mut self.packing,
+            &mut self.law,
+            &mut self.form,
+            &self.net,
+            (self.f_max, self.threshold),
+        );
+        if kept {
+            turns.succeed();
+            self.state.restart(&self.fire);
+            self.velocities.fill(Vec2::zeros());
+        } else {
+            turns.fail();
+        }
+        kept
     }
 
     /// The contact problem at the new positions, to the tolerance that is due at the `f_max` that its forces give.
@@ -311,7 +355,9 @@ impl Relaxation {
     }
 
     fn balance(&mut self) {
-        net_forces(&self.law.contacts(), &mut self.net);
+        let gamma = self.law.line_tension();
+        self.form
+            .evaluate(&self.law.contacts(), &self.packing, gamma, &mut self.net);
         self.f_max = largest_force(&self.net) / self.law.line_tension();
     }
 
@@ -445,6 +491,12 @@ impl Relaxation {
             self.packing.len(),
             self.law.line_tension(),
             (self.f_max, self.state.dt),
+        )
+        .with_torques(
+            &self.law.contacts(),
+            self.packing.domain(),
+            self.law.line_tension(),
+            self.form.torques(),
         )
     }
 

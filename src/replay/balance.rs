@@ -8,7 +8,7 @@ use crate::contact::list::ContactList;
 use crate::contact::matrix::{ContactMatrix, Geometry};
 use crate::contact::{ACCEPTED, ContactError, ContactLaw, FrameContacts, Rule, due_tolerance};
 use crate::domain::Vec2;
-use crate::force::{Observables, largest_force, net_forces};
+use crate::force::{NetForces, Observables, largest_force};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::record::Outcome;
@@ -80,6 +80,7 @@ struct Allowed {
 #[derive(Clone, Debug)]
 pub struct Balance {
     law: ContactLaw,
+    form: NetForces,
     rule: Rule,
     threshold: f64,
     tolerance: f64,
@@ -124,6 +125,7 @@ impl Balance {
                 scene.line_tension,
                 scene.contact_tolerance.min(1e-12),
             ),
+            form: NetForces::new(scene.forces),
             rule: scene.contact_rule,
             threshold: scene.threshold,
             tolerance: scene.contact_tolerance,
@@ -155,8 +157,9 @@ impl Balance {
         let scale = view.overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
         let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
         let mut net = vec![Vec2::zeros(); packing.len()];
-        net_forces(&view, &mut net);
-        let f_max = largest_force(&net) / self.law.line_tension();
+        let gamma = self.law.line_tension();
+        self.form.evaluate(&view, packing, gamma, &mut net);
+        let f_max = largest_force(&net) / gamma;
         self.last = Some((step, f_max));
         let allowed = self.allowed(packing, view.overlaps, f_max, step);
         // Eq. (4), row by row.

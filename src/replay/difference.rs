@@ -2,6 +2,7 @@
 
 use crate::domain::Vec2;
 use crate::frame::Frame;
+use crate::relax::fire::FireState;
 use core::fmt;
 
 /// The first difference between a recorded frame and the one it is held against.
@@ -96,10 +97,14 @@ fn what(a: &Frame, b: &Frame) -> Option<What> {
         .or_else(|| count("forces", a.forces.len(), b.forces.len()))
         .or_else(|| numbers(&a.forces, &b.forces, |c| format!("force of contact {c}")))
         .or_else(|| {
-            let names = ["dt", "dt_max", "alpha", "downhill", "moves", "time"];
             numbers(&a.minimizer.values(), &b.minimizer.values(), |k| {
-                format!("{} of the minimiser", names[k])
+                let name = FireState::NAMES.get(k).unwrap_or(&"value");
+                format!("{name} of the minimiser")
             })
+        })
+        .or_else(|| {
+            let count_of = |frame: &Frame| frame.minimizer.values().len();
+            count("values of the minimiser", count_of(a), count_of(b))
         })
 }
 

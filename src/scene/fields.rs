@@ -5,6 +5,7 @@ use crate::contact::Rule;
 use crate::contact::solver::Method;
 use crate::disks::DiskParameters;
 use crate::droplet::contour::ContourStyle;
+use crate::force::Form;
 use crate::relax::fire::Fire;
 
 /// The fields of a scene file, each of which may be missing. Whole numbers are signed here, so that a negative one is
@@ -40,6 +41,7 @@ pub struct SceneFields {
     pub threshold: Option<f64>,
     pub steps: Option<i128>,
     pub minimizer: Option<Minimizer>,
+    pub forces: Option<Form>,
     pub dt_max: Option<f64>,
     pub contact_rule: Option<Rule>,
     pub contact_solver: Option<Method>,
@@ -117,6 +119,7 @@ impl SceneFields {
             threshold,
             steps,
             minimizer,
+            forces,
             dt_max,
             contact_rule,
             contact_solver,
@@ -153,6 +156,7 @@ impl SceneFields {
             threshold: self.threshold.unwrap_or(default.threshold),
             steps: count("steps", self.steps, default.steps, 0)?,
             minimizer: self.minimizer.unwrap_or_default(),
+            forces: self.forces.unwrap_or_default(),
             dt_max: self.dt_max,
             contact_rule: self.contact_rule.unwrap_or_default(),
             contact_solver: self.contact_solver.unwrap_or_default(),

@@ -28,6 +28,7 @@ use crate::contact::solver::Method;
 use crate::contact::{ContactLaw, Rule};
 use crate::disks::DiskParameters;
 use crate::droplet::contour::ContourStyle;
+use crate::force::Form;
 use crate::relax::fire::Fire;
 
 /// One kind of particle in a mixture.
@@ -113,6 +114,9 @@ pub enum Minimizer {
     /// FIRE 2.0, see [`crate::relax::fire`].
     #[default]
     Fire,
+    /// FIRE through the rearrangements, then Newton's method, see [`crate::relax::newton`].
+    #[serde(rename = "fire+newton")]
+    FireNewton,
 }
 
 /// Everything that a run depends on.
@@ -146,12 +150,15 @@ pub struct Scene {
     pub seed: u64,
     /// Line tension γ (force), 1e-100…1e100. Default 1, which makes γ the unit of force.
     pub line_tension: f64,
-    /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10.
+    /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10. FIRE alone comes down to
+    /// about 1e-12, [`Minimizer::FireNewton`] to 1e-13 and below, both at the default contact tolerance.
     pub threshold: f64,
     /// The run ends at this step in any case. Default 200 000.
     pub steps: u64,
     /// The minimiser.
     pub minimizer: Minimizer,
+    /// The forces that move the particles. Default central.
+    pub forces: Form,
     /// Upper bound of the minimiser's time step (time, mass 1), positive. Default: from the largest frequency at the
     /// start.
     pub dt_max: Option<f64>,
@@ -184,6 +191,7 @@ impl Default for Scene {
             threshold: 1e-10,
             steps: 200_000,
             minimizer: Minimizer::default(),
+            forces: Form::default(),
             dt_max: None,
             contact_rule: Rule::default(),
             contact_solver: Method::default(),

@@ -116,7 +116,16 @@ impl Scene {
             "steps",
             self.steps,
         );
-        page.field("Minimiser: \"fire\".", "minimizer", value(&self.minimizer));
+        page.field(
+            "Minimiser: \"fire\", or \"fire+newton\" (FIRE through the rearrangements, then Newton's method).",
+            "minimizer",
+            value(&self.minimizer),
+        );
+        page.field(
+            "Forces: \"central\" (along the lines of centres) or \"gradient\" (of the stored energy).",
+            "forces",
+            value(&self.forces),
+        );
         match self.dt_max {
             Some(dt_max) => page.field("Upper bound of the time step.", "dt_max", number(dt_max)),
             None => page.text(

@@ -25,6 +25,12 @@ def g(theta):
     return (np.pi - t) * np.sin(t) - 0.5 * np.cos(t) - 1.0
 
 
+def dg(theta):
+    """The slope of g; it jumps at 0, where no two contacts of a particle lie."""
+    t = np.mod(theta, 2 * np.pi)
+    return (np.pi - t) * np.cos(t) - 0.5 * np.sin(t)
+
+
 class Recording:
     def __init__(self, path):
         self.states, self.contours, self.metrics = {}, {}, {}
@@ -34,6 +40,7 @@ class Recording:
             if "softjam.Scene:toml" in batch.schema.names:
                 scene = tomllib.loads(batch["softjam.Scene:toml"][0][0].as_py())
                 self.line_tension = scene["line_tension"]
+                self.gradient = scene.get("forces", "central") == "gradient"
                 self.threshold, self.tolerance = scene["threshold"], scene["contact_tolerance"]
                 self.seed_rule = scene["contact_rule"] == "seed"
             if entity == "/particles":
@@ -110,6 +117,17 @@ def check_state(recording, state, gamma):
     net = np.zeros((n, 2))
     np.add.at(net, i, forces[:, None] * normal)
     np.add.at(net, j, -forces[:, None] * normal)
+    if recording.gradient:
+        # -dU/dr = f n + (tau / r) t, tau_c = -f_c sum R_p/(2 pi gamma) g'(angle of c less that of k) f_k.
+        torque = np.zeros(len(forces))
+        for p in range(n):
+            for a, c in around[p]:
+                for b, k in around[p]:
+                    if c != k:
+                        torque[c] -= radii[p] / (2 * np.pi * gamma) * dg(a - b) * forces[c] * forces[k]
+        push = (torque / r)[:, None] * np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        np.add.at(net, i, push)
+        np.add.at(net, j, -push)
     return {
         "eq4": residual,
         "gap": least_gap / scale,

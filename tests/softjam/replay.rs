@@ -2,12 +2,15 @@
 
 use crate::common::Random;
 use crate::files::{open, record_as, states};
+use softjam::force::Form;
 use softjam::frame::Frame;
 use softjam::record::{Format, Snapshot};
+use softjam::relax::Relaxation;
+use softjam::relax::newton::Turns;
 use softjam::replay::{
     Balance, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
 };
-use softjam::scene::{Channels, Scene, Schedule};
+use softjam::scene::{Channels, Minimizer, Scene, Schedule};
 
 fn scene() -> Scene {
     Scene {
@@ -46,6 +49,80 @@ fn a_fresh_recording_is_what_its_scene_gives_whichever_way_it_is_run() {
     assert_eq!(verdicts[0].metrics, 9 * (last + 1));
     assert_eq!(verdicts[0], verdicts[1]);
     assert_eq!(verdicts[0], verdicts[2]);
+}
+
+/// Recorded to the last frame with Newton's method at work, with either form of the forces.
+fn finished(forces: Form) -> Scene {
+    Scene {
+        minimizer: Minimizer::FireNewton,
+        forces,
+        threshold: 1e-13,
+        channels: Channels {
+            state: Schedule::Every(1),
+            ..scene().channels
+        },
+        ..scene()
+    }
+}
+
+#[test]
+fn a_run_finished_by_newton_with_either_form_of_forces_is_verified() {
+    for forces in [Form::Central, Form::Gradient] {
+        let scene = finished(forces);
+        let bytes = record(&scene, |_| {});
+        let frames = states(&bytes);
+        let last = frames.last().expect("a state");
+        assert!(last.minimizer.turns.moves > 0, "{forces:?}");
+        for way in WAYS {
+            let verdict = replay(&bytes, way).expect("a verdict");
+            assert_eq!(verdict.difference, None, "{forces:?}, {way:?}");
+        }
+        let mut balance = Balance::new(&scene);
+        let mut recording = open(&bytes).expect("a recording");
+        let mut packing = None;
+        for event in &mut recording {
+            if let Event::State(frame) = event.expect("undamaged") {
+                let packing = packing.get_or_insert_with(|| {
+                    Relaxation::new(&scene).expect("a scene").packing().clone()
+                });
+                let there = Relaxation::resume(&scene, packing.clone(), frame.clone());
+                balance.check(there.expect("a frame").packing(), &frame, &[]);
+            }
+        }
+        assert!(balance.agrees(), "{forces:?}: {balance:?}");
+        assert!(balance.last.is_some_and(|(_, f_max)| f_max <= 1e-13));
+    }
+}
+
+#[test]
+fn forged_turns_of_the_minimiser_are_found() {
+    let scene = finished(Form::Central);
+    let whole = record(&scene, |_| {});
+    let first = states(&whole)
+        .into_iter()
+        .find(|f| f.minimizer.turns.moves > 0);
+    let step = first.expect("Newton's method at work").step;
+    let forged = record(&scene, |snapshot| {
+        if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.step == step) {
+            frame.minimizer.turns.moves += 1;
+        }
+    });
+    for way in WAYS {
+        let found = replay(&forged, way).expect("a verdict").difference;
+        let found = found.expect("the forgery is found").to_string();
+        assert!(
+            found.starts_with(&format!("step {step}: newton_moves of the minimiser")),
+            "{way:?}: {found}"
+        );
+    }
+    let forged = record(&scene, |snapshot| {
+        if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.step == step) {
+            frame.minimizer.turns = Turns::default();
+        }
+    });
+    let found = replay(&forged, Way::Whole).expect("a verdict").difference;
+    let found = found.expect("the forgery is found").to_string();
+    assert!(found.contains("values of the minimiser"), "{found}");
 }
 
 #[test]

@@ -116,7 +116,8 @@ fn fields_and_values_of_the_wrong_kind_are_shown() {
         disks.steps = -1                    => disks.steps = -1
         contours.vertices = -3              => contours.vertices = -3
         contours.placement = "corners"      => contours.placement = "corners"
-        minimizer = "newton"                => minimizer = "newton"
+        minimizer = "newton"                => minimizer = "newton" & fire+newton
+        forces = "radial"                   => forces = "radial" & gradient
         contact_rule = "guess"              => contact_rule = "guess"
         contact_solver = "lu"               => contact_solver = "lu"
         start = "square"                    => start = "square" & hexagonal

@@ -2,14 +2,7 @@
 
 use super::SolverError;
 use crate::contact::matrix::ContactMatrix;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use crate::simplicial::Simplicial;
 
 /// faer's `L Lᵀ` of the lower triangle, with an approximate minimum-degree ordering; the symbolic part is kept while
 /// the pattern of the matrix stays.
@@ -25,18 +18,9 @@ pub struct SparseCholesky {
     /// Lower triangle by columns: pointers, rows (ascending) and values.
     pointers: Vec<u32>,
     rows: Vec<u32>,
-    values: Vec<f64>,
-    symbolic: Option<Symbolic>,
-    factor: Vec<f64>,
+    values: Vec<[[f64; 1]; 1]>,
+    factor: Simplicial<1>,
     order: Vec<(u32, f64)>,
-    analyses: u64,
-}
-
-#[derive(Clone, Debug)]
-struct Symbolic {
-    pointers: Vec<u32>,
-    rows: Vec<u32>,
-    factorization: std::sync::Arc<SymbolicCholesky<u32>>,
 }
 
 impl SparseCholesky {
@@ -65,60 +49,11 @@ impl SparseCholesky {
             contacts: n,
         };
         self.lower_triangle(matrix);
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.pointers, None, &self.rows);
-        let known = self
-            .symbolic
-            .take()
-            .filter(|s| s.pointers == self.pointers && s.rows == self.rows);
-        let stands = known.is_some();
-        let symbolic = match known {
-            Some(symbolic) => symbolic,
-            None => Symbolic {
-                pointers: self.pointers.clone(),
-                rows: self.rows.clone(),
-                factorization: std::sync::Arc::new(
-                    factorize_symbolic_cholesky(
-                        pattern,
-                        Side::Lower,
-                        SymmetricOrdering::Amd,
-                        CholeskySymbolicParams {
-                            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
-                            ..Default::default()
-                        },
-                    )
-                    .map_err(|_| failed(0))?,
-                ),
-            },
-        };
-        self.analyses += u64::from(!stands);
-        let factorization = std::sync::Arc::clone(&symbolic.factorization);
-        self.symbolic = Some(symbolic);
-        self.factor.clear();
-        self.factor.resize(factorization.len_val(), 0.0);
-        let mut memory = MemBuffer::new(
-            factorization.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-        );
-        let llt = factorization
-            .factorize_numeric_llt(
-                &mut self.factor,
-                SparseColMatRef::new(pattern, &self.values),
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .map_err(|error| match error {
-                LltError::NonPositivePivot { index } => failed(index),
-            })?;
+        self.factor
+            .factorize(&self.pointers, &self.rows, &self.values)
+            .map_err(|pivot| failed(pivot.0))?;
         forces.copy_from_slice(overlaps);
-        let mut memory = MemBuffer::new(factorization.solve_in_place_scratch::<f64>(1, Par::Seq));
-        llt.solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(forces, n, 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        self.factor.solve(forces);
         match forces.iter().position(|f| !f.is_finite()) {
             Some(contact) => Err(failed(contact)),
             None => Ok(()),
@@ -127,7 +62,7 @@ impl SparseCholesky {
 
     /// How often a pattern was analysed.
     pub(crate) fn symbolic_factorizations(&self) -> u64 {
-        self.analyses
+        self.factor.analyses()
     }
 
     fn lower_triangle(&mut self, matrix: &ContactMatrix) {
@@ -147,7 +82,7 @@ impl SparseCholesky {
             );
             self.order.sort_unstable_by_key(|&(k, _)| k);
             self.rows.extend(self.order.iter().map(|e| e.0));
-            self.values.extend(self.order.iter().map(|e| e.1));
+            self.values.extend(self.order.iter().map(|e| [[e.1]]));
             self.pointers.push(self.rows.len() as u32);
         }
     }

