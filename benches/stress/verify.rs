@@ -19,6 +19,9 @@ pub struct Answer<'a> {
     pub gradient: bool,
 }
 
+/// i, j, `r_i − r_j`, and the force in units of γ.
+type Contact = (usize, usize, [f64; 2], f64);
+
 /// How far an answer is from what it ought to be.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
@@ -66,7 +69,7 @@ impl Answer<'_> {
     /// Checks every promise of the contact law, and the balance.
     pub fn check(&self) -> Check {
         let n = self.radii.len();
-        let contacts: Vec<(usize, usize, [f64; 2], f64)> = self
+        let contacts: Vec<Contact> = self
             .pairs
             .iter()
             .zip(self.forces)
@@ -94,20 +97,7 @@ impl Answer<'_> {
             overlap = overlap.max((self.radii[i] + self.radii[j] - r).abs());
         }
         if self.gradient {
-            // U(r) = max over f of δᵀf − ½ fᵀA f: at fixed f, A changes with the direction θ of each contact only, and a contact
-            // turns by dθ = t·(dr_j − dr_i)/r, t a quarter turn ahead of the direction from i to j.
-            for &(i, j, d, f) in &contacts {
-                let torque = |p: usize, angle: f64| -> f64 {
-                    let sum: f64 = around[p].iter().map(|(a, k)| k * slope(angle - a)).sum();
-                    self.radii[p] / (2.0 * PI) * f * sum
-                };
-                let (angle, r) = (toward(d), d[0].hypot(d[1]));
-                let per_length = (torque(i, angle) + torque(j, away(d))) / r;
-                for (k, t) in [-angle.sin(), angle.cos()].into_iter().enumerate() {
-                    net[i][k] += per_length * t;
-                    net[j][k] -= per_length * t;
-                }
-            }
+            self.turn(&contacts, &around, &mut net);
         }
         let contour = |p: usize, angle: f64| {
             let sum: f64 = around[p].iter().map(|(a, f)| f * g(angle - a)).sum();
@@ -166,6 +156,27 @@ impl Answer<'_> {
                 .sum::<f64>()
                 / (2.0 * self.sides[0] * self.sides[1]),
             finite,
+        }
+    }
+
+    /// What the gradient form adds to the net forces: with `U(r) = max over f of δᵀf − ½ fᵀA f`, at fixed `f` only the
+    /// directions θ of the contacts change `A`, and a contact turns by `dθ = t·(dr_j − dr_i)/r`, `t` a quarter turn ahead of
+    /// the direction from i to j.
+    fn turn(&self, contacts: &[Contact], around: &[Vec<(f64, f64)>], net: &mut [[f64; 2]]) {
+        for &(i, j, d, f) in contacts {
+            let torque = |p: usize, angle: f64| -> f64 {
+                let sum: f64 = around[p].iter().map(|(a, k)| k * slope(angle - a)).sum();
+                self.radii[p] / (2.0 * PI) * f * sum
+            };
+            let (angle, r) = (toward(d), d[0].hypot(d[1]));
+            // Coincident centres have no direction.
+            if r > 0.0 {
+                let per_length = (torque(i, angle) + torque(j, away(d))) / r;
+                for (k, t) in [-angle.sin(), angle.cos()].into_iter().enumerate() {
+                    net[i][k] += per_length * t;
+                    net[j][k] -= per_length * t;
+                }
+            }
         }
     }
 

@@ -15,7 +15,9 @@ mod verify;
 use families::Case;
 use softjam::contact::{ContactError, ContactLaw};
 use softjam::domain::{Domain, Vec2};
+use softjam::force::Form;
 use softjam::packing::Packing;
+use softjam::scene::Scene;
 use verify::Answer;
 
 /// The cases of a family.
@@ -76,6 +78,21 @@ fn nearly_equal_angles_thresholds_and_lattices_all_converge() {
 fn coincident_centres_converge_or_their_forces_are_absurd() {
     let (converged, all) = converged(family("coincident"));
     assert!(converged + 6 >= all, "{converged} of {all}");
+}
+
+#[test]
+fn coincident_centres_do_not_spoil_the_gradient_form() {
+    // A contact without a direction cannot turn; its torque over its length was NaN.
+    let at = |x: f64, y: f64| Vec2::new(x, y);
+    let points = vec![at(4.0, 4.0), at(4.9, 4.0), at(4.9, 4.0), at(4.0, 4.9)];
+    let packing = Packing::new(Domain::new(9.0, 9.0).unwrap(), vec![0.5; 4], points).unwrap();
+    let scene = Scene {
+        forces: Form::Gradient,
+        ..Scene::default()
+    };
+    let outcome = outcome::of_packing(&scene, &packing);
+    assert!(outcome.wrong.is_none(), "{outcome:?}");
+    assert_eq!(outcome.end, "converged");
 }
 
 #[test]
