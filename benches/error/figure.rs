@@ -122,28 +122,60 @@ fn relaxation(table: &Table) -> String {
         table.points(&filter, "seconds", "f_max")
     };
     let styles = [
-        ("fire", BLUE, Marker::Circle, Line::Solid),
-        ("fire + newton", RED, Marker::Diamond, Line::Solid),
-        ("fire, gradient form", SKY, Marker::Open, Line::Solid),
+        ("fire", "FIRE", BLUE, Marker::Circle, Line::Solid),
         (
-            "fire + newton, gradient form",
+            "fire + newton",
+            "FIRE + Newton",
+            RED,
+            Marker::Diamond,
+            Line::Solid,
+        ),
+        (
+            "fire (gradient form)",
+            "FIRE, gradient form",
+            SKY,
+            Marker::Open,
+            Line::Solid,
+        ),
+        (
+            "fire + newton (gradient form)",
+            "+ Newton, gradient",
             ORANGE,
             Marker::Triangle,
             Line::Solid,
         ),
-        ("fire, dt_max / 2", PINK, Marker::None, Line::Dashed),
-        ("fire, dt_max × 1.4", GREEN, Marker::None, Line::Dashed),
-        ("fire, dt_max × 2", BLACK, Marker::None, Line::Dashed),
+        (
+            "fire (dt_max / 2)",
+            "FIRE, dt / 2",
+            PINK,
+            Marker::None,
+            Line::Dashed,
+        ),
+        (
+            "fire (dt_max × 1.4)",
+            "FIRE, dt × 1.4",
+            GREEN,
+            Marker::None,
+            Line::Dashed,
+        ),
+        (
+            "fire (dt_max × 2)",
+            "FIRE, dt × 2",
+            BLACK,
+            Marker::None,
+            Line::Dashed,
+        ),
     ];
     let series: Vec<Series> = styles
         .into_iter()
-        .map(|(name, color, marker, line)| series(name, of(name), color, marker, line))
+        .map(|(name, label, color, marker, line)| series(label, of(name), color, marker, line))
         .filter(|s| !s.points.is_empty())
         .collect();
     let x = decades(series.iter().flat_map(|s| &s.points).map(|p| &p.0));
     Panel {
         title: format!("b  Relaxation, N = {n}, φ = {phi}, both stages"),
-        x: Axis::log("wall time (s)", x),
+        // A decade on the left for the legend.
+        x: Axis::log("wall time (s)", (0.1 * x.0, x.1)),
         y: Axis::log("largest net force (γ)", (1e-14, 1.0)),
         legend: (0.03, 0.52),
         notes: Vec::new(),

@@ -15,15 +15,15 @@ type Variant = (&'static str, &'static str, f64);
 const VARIANTS: [Variant; 7] = [
     ("fire", "", 1.0),
     ("fire + newton", "minimizer = \"fire+newton\"", 1.0),
-    ("fire, gradient form", "forces = \"gradient\"", 1.0),
+    ("fire (gradient form)", "forces = \"gradient\"", 1.0),
     (
-        "fire + newton, gradient form",
+        "fire + newton (gradient form)",
         "minimizer = \"fire+newton\"\nforces = \"gradient\"",
         1.0,
     ),
-    ("fire, dt_max / 2", "", 0.5),
-    ("fire, dt_max × 1.4", "", 1.4),
-    ("fire, dt_max × 2", "", 2.0),
+    ("fire (dt_max / 2)", "", 0.5),
+    ("fire (dt_max × 1.4)", "", 1.4),
+    ("fire (dt_max × 2)", "", 2.0),
 ];
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {

@@ -21,6 +21,7 @@ impl Table {
     /// Adds a row and shows it.
     pub fn push(&mut self, row: Vec<String>) {
         assert_eq!(row.len(), self.columns.len(), "one field a column");
+        assert!(row.iter().all(|f| !f.contains(',')), "a comma in {row:?}");
         let shown: Vec<String> = self
             .columns
             .iter()
