@@ -4,6 +4,7 @@ use super::flags::{RECORDING, SceneFlags};
 use super::output::{Output, open_with, same};
 use super::{Verdict, print};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
@@ -113,6 +114,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         from,
         (disks, start.elapsed()),
     ))?;
+    let validity = Validity::of(&run.contacts(), run.packing().len(), scene.line_tension);
+    if let Some(warning) = validity.warning() {
+        warn(&warning);
+    }
     Ok(match summary.outcome {
         None => Verdict::Interrupted,
         Some(outcome) if outcome.converged => Verdict::Good,

@@ -20,6 +20,7 @@
 
 use super::error::ContactError;
 use super::geometry::Kept;
+use super::images::second_image;
 use super::law::ContactLaw;
 use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
@@ -184,18 +185,23 @@ impl ContactLaw {
         }
     }
 
-    /// Two images of one neighbour are at least half a side apart: no particle may reach farther than a quarter.
+    /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
-        let shortest = packing.domain().shortest();
-        for (particle, (bulge, radius)) in self.bulges.iter().zip(packing.radii()).enumerate() {
-            let reach = radius + bulge;
-            if 4.0 * reach > shortest {
-                return Err(ContactError::BoxTooSmall {
-                    particle,
-                    reach,
-                    shortest,
-                });
-            }
+        let reach = |p: usize| packing.radii()[p] + self.bulges[p];
+        let scale = self.scale();
+        if let Some((particle, other)) = second_image(
+            packing,
+            &self.contacts(),
+            self.line_tension,
+            reach,
+            ACCEPTED * self.allowed(scale),
+        ) {
+            return Err(ContactError::BoxTooSmall {
+                particle,
+                other,
+                reach: reach(particle),
+                shortest: packing.domain().shortest(),
+            });
         }
         if let Some((particle, bulge)) = self.absurd {
             return Err(ContactError::Absurd {

@@ -9,15 +9,17 @@ pub enum ContactError {
     /// `A f = δ` was not solved.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// A particle reaches so far that it could touch two images of the same neighbour.
+    /// A particle touches two images of the same neighbour, or of itself.
     #[error(
-        "particle {particle} reaches {reach:.4} (radius and largest bulge), more than a quarter of the box's shorter side \
-         {shortest:.4}: it could touch two images of one neighbour; take more particles or a lower phi"
+        "particle {particle} touches particle {other} across more than one side of the box, whose shorter side is \
+         {shortest:.4} (it reaches up to {reach:.4}); take more particles or a lower phi"
     )]
     BoxTooSmall {
         /// The particle.
         particle: usize,
-        /// Its undeformed radius and the bound of its bulge (length).
+        /// The particle of which it touches two images; itself where it touches its own.
+        other: usize,
+        /// Undeformed radius of the first and the bound of its bulge (length).
         reach: f64,
         /// The shorter side of the box (length).
         shortest: f64,

@@ -23,6 +23,7 @@
 pub mod complementarity;
 mod error;
 mod geometry;
+mod images;
 mod law;
 pub mod list;
 pub mod matrix;

@@ -7,3 +7,4 @@
 mod angle;
 pub mod contour;
 pub mod kernel;
+pub mod validity;

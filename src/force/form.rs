@@ -102,6 +102,10 @@ impl NetForces {
         self.turning.rebuild(contacts, packing, line_tension);
         self.turning.torques(contacts.forces, &mut self.torques);
         for (c, &[i, j]) in contacts.pairs.iter().enumerate() {
+            if contacts.distances[c] == 0.0 {
+                // Coincident centres have no direction that could turn.
+                continue;
+            }
             let push = tangent(contacts.normals[c]) * (self.torques[c] / contacts.distances[c]);
             net[i as usize] += push;
             net[j as usize] -= push;

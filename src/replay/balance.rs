@@ -218,7 +218,7 @@ impl Balance {
     ) {
         let gamma = self.law.line_tension();
         let mut neighbors = crate::neighbors::NeighborList::new();
-        // No bulge is wider than its particle in any packing that the box allows; see `ContactError::BoxTooSmall`.
+        // Wider bulges than the largest particle is large are left to the comparison with the forces found anew.
         neighbors.update(packing, 2.0 * packing.largest_radius(), 0.0);
         for &[i, j] in neighbors.pairs() {
             if list.partners(i as usize).binary_search(&j).is_err() {

@@ -148,7 +148,7 @@ pub struct Scene {
     pub start: Start,
     /// Seed of the ChaCha8 generator behind random starts and continuous radii, any u64. Default 1.
     pub seed: u64,
-    /// Line tension γ (force), positive. Default 1, which makes γ the unit of force.
+    /// Line tension γ (force), 1e-100…1e100. Default 1, which makes γ the unit of force.
     pub line_tension: f64,
     /// The run has converged when `f_max` (in units of γ) is not above this; positive. Default 1e-10. FIRE alone comes down to
     /// about 1e-12, [`Minimizer::FireNewton`] to 1e-13 and below, both at the default contact tolerance.

@@ -18,7 +18,13 @@ impl Scene {
     /// assert_eq!(error.to_string(), "aspect = NaN is outside 0.1 ≤ aspect ≤ 10 (L_x / L_y)");
     /// ```
     pub fn validate(&self) -> Result<(), SceneError> {
-        positive("line_tension", self.line_tension)?;
+        within(
+            "line_tension",
+            self.line_tension,
+            (1e-100..=1e100).contains(&self.line_tension),
+            // Squares of forces far below it must not vanish, nor those far above it overflow.
+            "1e-100 ≤ line_tension ≤ 1e100 (the unit of force)",
+        )?;
         positive("threshold", self.threshold)?;
         if let Some(dt_max) = self.dt_max {
             positive("dt_max", dt_max)?;

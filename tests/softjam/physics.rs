@@ -13,4 +13,5 @@ mod matrix;
 mod model;
 mod newton;
 mod relaxation;
+mod stress;
 mod work;

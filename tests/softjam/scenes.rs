@@ -41,7 +41,7 @@ fn numbers_out_of_range_are_named_with_their_value() {
         ("particles", "0 -5 10000001"),
         ("phi", "0.0 -0.1 1.3 1.7 nan inf -inf"),
         ("aspect", "0.0 -1.0 0.09 10.1 nan inf"),
-        ("line_tension", "0.0 -1.0 nan inf"),
+        ("line_tension", "0.0 -1.0 9.9e-101 1.1e100 nan inf"),
         ("threshold", "0.0 -1e-10 nan inf"),
         ("steps", "-1"),
         ("dt_max", "0.0 -0.1 nan inf"),
