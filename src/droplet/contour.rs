@@ -4,6 +4,17 @@
 //! contour has a cusp at each contact. Vertices at equal angles, as in the seed, cut the cusps off; with
 //! [`Placement::Contacts`] one more vertex stands on each contact angle, so that the contour is drawn to its tip.
 //!
+//! Between two neighbouring contacts the contour is one elementary function: with `g(θ) = (π − θ) sin θ − ½ cos θ − 1` and
+//! the addition theorems
+//!
+//! ```text
+//! Σ_j f_j g(θ − θ_j) = sin θ (A_c − ½ S_s) − cos θ (A_s + ½ S_c) − θ (sin θ S_c − cos θ S_s) − S
+//! S = Σ f_j,  S_c = Σ f_j cos θ_j,  S_s = Σ f_j sin θ_j,  A_c = Σ f_j α_j cos θ_j,  A_s = Σ f_j α_j sin θ_j
+//! ```
+//!
+//! where `α_j = θ_j + π` for the contacts that lie before θ and `θ_j − π` for those behind it, all angles in `(−π, π]`. So a
+//! vertex costs the same however many contacts the particle has.
+//!
 //! Near a contact the notches of the two particles overlap in a thin lens of half-width `f R_eff/γ` and depth
 //! `f² R_eff/4γ²`, `R_eff = 2 R_i R_j/(R_i + R_j)`: that is what the linear model says, and it is drawn as it is.
 
@@ -75,14 +86,16 @@ pub enum Placement {
 #[derive(Clone, Debug)]
 pub struct Contours {
     style: ContourStyle,
+    /// The equally spaced directions, by ascending angle in `(−π, π]`.
     circle: Vec<Direction>,
+    /// How many of them come before angle 0.
+    below: usize,
     /// Polygon `p` is `vertices[first[p]..first[p + 1]]`.
     first: Vec<usize>,
     vertices: Vec<Vec2>,
     /// The contacts of each particle: `contacts[entry[p]..entry[p + 1]]` are its directions and forces.
     entry: Vec<usize>,
     contacts: Vec<(Direction, f64)>,
-    around: Vec<Direction>,
     evaluations: u64,
 }
 
@@ -95,8 +108,11 @@ impl Contours {
     /// ```
     #[must_use]
     pub fn new(style: ContourStyle) -> Self {
-        let circle = (0..style.vertices)
-            .map(|k| 2.0 * PI * k as f64 / style.vertices as f64)
+        let n = style.vertices;
+        let below = n - (n / 2 + 1);
+        let circle = (0..n)
+            .map(|k| (k + n - below) % n)
+            .map(|k| 2.0 * PI * k as f64 / n as f64)
             .map(|angle| Direction {
                 cos: libm::cos(angle),
                 sin: libm::sin(angle),
@@ -106,18 +122,18 @@ impl Contours {
         Self {
             style,
             circle,
+            below,
             first: vec![0],
             vertices: Vec::new(),
             entry: Vec::new(),
             contacts: Vec::new(),
-            around: Vec::new(),
             evaluations: 0,
         }
     }
 
     /// Draws the contours of particles of `radii` at `positions` with `contacts`; `line_tension` is γ.
     ///
-    /// A particle without a contact is its circle; the kernel is not evaluated for it.
+    /// A particle without a contact is its circle; nothing is computed for it.
     ///
     /// # Panics
     ///
@@ -137,27 +153,25 @@ impl Contours {
         self.first.push(0);
         self.vertices.clear();
         for (p, (&radius, &centre)) in radii.iter().zip(positions).enumerate() {
-            let contacts = &self.contacts[self.entry[p]..self.entry[p + 1]];
+            let contacts = &mut self.contacts[self.entry[p]..self.entry[p + 1]];
+            let start = self.vertices.len();
             if contacts.is_empty() {
-                self.vertices.extend(
-                    self.circle
-                        .iter()
-                        .map(|d| centre + Vec2::new(d.cos, d.sin) * radius),
-                );
+                let point = |d: &Direction| centre + Vec2::new(d.cos, d.sin) * radius;
+                self.vertices.extend(self.circle.iter().map(point));
             } else {
-                self.around.clear();
-                self.around.extend_from_slice(&self.circle);
-                if self.style.placement == Placement::Contacts {
-                    self.around.extend(contacts.iter().map(|c| c.0));
-                    self.around.sort_by(|a, b| a.angle.total_cmp(&b.angle));
-                }
-                let scale = radius / (2.0 * PI * line_tension);
-                for d in &self.around {
-                    let sum: f64 = contacts.iter().map(|(c, f)| f * d.g_between(*c)).sum();
-                    let rho = radius + scale * sum;
-                    self.vertices.push(centre + Vec2::new(d.cos, d.sin) * rho);
-                }
-                self.evaluations += (self.around.len() * contacts.len()) as u64;
+                contacts.sort_unstable_by(|a, b| a.0.angle.total_cmp(&b.0.angle));
+                let outline = Outline {
+                    centre,
+                    radius,
+                    scale: radius / (2.0 * PI * line_tension),
+                };
+                let tips = self.style.placement == Placement::Contacts;
+                outline.draw(&self.circle, contacts, tips, &mut self.vertices);
+                self.evaluations += (self.vertices.len() - start) as u64;
+            }
+            // Equal angles are counted from 0; with vertices on the contacts any of them may be the first.
+            if contacts.is_empty() || self.style.placement == Placement::Equal {
+                self.vertices[start..].rotate_left(self.below);
             }
             self.first.push(self.vertices.len());
         }
@@ -244,7 +258,7 @@ impl Contours {
         self.vertices.len()
     }
 
-    /// How often the kernel was evaluated so far: a count of work.
+    /// How many vertices of particles with a contact were computed so far: a count of work.
     ///
     /// ```
     /// use softjam::droplet::contour::{ContourStyle, Contours};
@@ -253,6 +267,54 @@ impl Contours {
     #[must_use]
     pub fn evaluations(&self) -> u64 {
         self.evaluations
+    }
+}
+
+/// One particle that is being drawn.
+struct Outline {
+    centre: Vec2,
+    radius: f64,
+    scale: f64,
+}
+
+impl Outline {
+    /// Appends the vertices on `circle` and, with `tips`, on the angles of the contacts; both ascend by angle.
+    fn draw(
+        &self,
+        circle: &[Direction],
+        contacts: &[(Direction, f64)],
+        tips: bool,
+        vertices: &mut Vec<Vec2>,
+    ) {
+        let (mut s, mut s_c, mut s_s, mut a_c, mut a_s) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (d, f) in contacts {
+            let (c, s_j) = (f * d.cos, f * d.sin);
+            s += f;
+            s_c += c;
+            s_s += s_j;
+            a_c += c * (d.angle - PI);
+            a_s += s_j * (d.angle - PI);
+        }
+        let point = |d: &Direction, a_c: f64, a_s: f64| {
+            let sum = d.sin * (a_c - 0.5 * s_s)
+                - d.cos * (a_s + 0.5 * s_c)
+                - d.angle * (d.sin * s_c - d.cos * s_s)
+                - s;
+            self.centre + Vec2::new(d.cos, d.sin) * (self.radius + self.scale * sum)
+        };
+        let mut rest = circle;
+        for (contact, f) in contacts {
+            let sector = rest.partition_point(|d| d.angle < contact.angle);
+            let (before, behind) = rest.split_at(sector);
+            vertices.extend(before.iter().map(|d| point(d, a_c, a_s)));
+            if tips {
+                vertices.push(point(contact, a_c, a_s));
+            }
+            rest = behind;
+            a_c += 2.0 * PI * f * contact.cos;
+            a_s += 2.0 * PI * f * contact.sin;
+        }
+        vertices.extend(rest.iter().map(|d| point(d, a_c, a_s)));
     }
 }
 
@@ -333,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_free_particle_costs_no_kernel_evaluation() {
+    fn a_contact_free_particle_costs_no_evaluation() {
         let mut contours = Contours::new(ContourStyle::default());
         let none = Contacts {
             pairs: &[],
