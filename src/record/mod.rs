@@ -18,6 +18,7 @@
 //! ```
 
 mod blueprint;
+mod columns;
 mod encode;
 mod mcap;
 pub(crate) mod messages;

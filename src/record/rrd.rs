@@ -14,8 +14,9 @@
 //! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
+use super::columns::{Column, StripRows, lists};
 use super::encode::Encoder;
-use super::pictures::{Network, Rgb, particle_colors};
+use super::pictures::{Network, particle_colors};
 use super::{
     FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written, blueprint, recording_id,
 };
@@ -26,7 +27,7 @@ use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, ListArray, StringArray, UInt8Array,
+    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array,
     UInt32Array, UInt64Array,
 };
 use rerun::external::arrow::buffer::OffsetBuffer;
@@ -88,8 +89,8 @@ pub struct RrdRecorder<W> {
 #[derive(Default)]
 struct Pending {
     metrics: Vec<MetricRow>,
-    contours: Vec<Row<LineStrips2D>>,
-    contacts: Vec<Row<LineStrips2D>>,
+    contours: StripRows,
+    contacts: StripRows,
     states: Vec<Row<DynamicArchetype>>,
     bytes: usize,
     snapshots: usize,
@@ -133,29 +134,30 @@ impl<W: Write> RrdRecorder<W> {
         })
     }
 
-    fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame, time: &TimePoint) {
-        let row = |data| Row {
-            time: time.clone(),
-            data,
-        };
+    fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
         if snapshot.contours || snapshot.contacts {
             let contacts = FrameContacts::of(&self.packing, frame);
             let contacts = contacts.view();
+            let radii = self.packing.radii();
             if snapshot.contours {
-                self.contours.draw(
-                    self.packing.radii(),
-                    &frame.positions,
-                    &contacts,
-                    self.line_tension,
-                );
-                let colors = particle_colors(self.packing.radii(), &contacts);
-                let strips = contour_strips(&self.contours, colors);
-                self.pending.contours.push(row(strips));
+                self.contours
+                    .draw(radii, &frame.positions, &contacts, self.line_tension);
+                let rows = &mut self.pending.contours;
+                for (p, color) in particle_colors(radii, &contacts).into_iter().enumerate() {
+                    let polygon = self.contours.polygon(p);
+                    rows.strip(polygon.iter().chain(polygon.first()), color);
+                }
+                rows.end_row(snapshot.step, snapshot.nanoseconds);
                 self.pending.bytes += 8 * self.contours.vertices();
             }
             if snapshot.contacts {
-                let network = Network::of(&frame.positions, self.packing.radii(), &contacts);
-                self.pending.contacts.push(row(contact_strips(&network)));
+                let network = Network::of(&frame.positions, radii, &contacts);
+                let rows = &mut self.pending.contacts;
+                for (segment, &relative) in network.segments.iter().zip(&network.relative) {
+                    rows.strip(segment, Network::color(relative));
+                    rows.half_width(network.half_width(relative));
+                }
+                rows.end_row(snapshot.step, snapshot.nanoseconds);
                 self.pending.bytes += 24 * contacts.pairs.len();
             }
         }
@@ -163,10 +165,11 @@ impl<W: Write> RrdRecorder<W> {
             let digest = frame.digest();
             self.digests.update(&digest);
             self.states += 1;
-            self.pending.states.push(Row {
-                time: time.clone(),
-                data: state(frame, &digest),
-            });
+            let time = TimePoint::default()
+                .with(Timeline::new_sequence("step"), snapshot.step as i64)
+                .with(Timeline::new_duration("sim_time"), snapshot.nanoseconds);
+            let data = state(frame, &digest);
+            self.pending.states.push(Row { time, data });
             self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
         }
     }
@@ -181,8 +184,8 @@ impl<W: Write> RrdRecorder<W> {
             last,
             ..
         } = core::mem::take(&mut self.pending);
-        self.write_rows("/world/contours", contours)?;
-        self.write_rows("/world/contacts", contacts)?;
+        self.write_strips("/world/contours", contours)?;
+        self.write_strips("/world/contacts", contacts)?;
         self.write_metrics(&metrics)?;
         self.write_rows("/state", states)?;
         self.intact = last.or(self.intact);
@@ -201,38 +204,55 @@ impl<W: Write> RrdRecorder<W> {
             .append(&self.store, &builder.build().map_err(io::Error::other)?)
     }
 
-    /// Metrics column by column: a row is too little data to be built by itself.
+    fn write_strips(&mut self, entity: &str, rows: StripRows) -> io::Result<()> {
+        if rows.times.is_empty() {
+            return Ok(());
+        }
+        let times = rows.times.clone();
+        self.write_columns(entity, &times, rows.into_columns()?)
+    }
+
     fn write_metrics(&mut self, rows: &[MetricRow]) -> io::Result<()> {
         if rows.is_empty() {
             return Ok(());
         }
+        let times: Vec<(u64, i64)> = rows.iter().map(|row| (row.0, row.1)).collect();
         for (k, name) in METRICS.into_iter().enumerate() {
-            let timelines = [
-                TimeColumn::new_sequence("step", rows.iter().map(|r| r.0 as i64)),
-                TimeColumn::new_duration_nanos("sim_time", rows.iter().map(|r| r.1)),
-            ];
-            let values: ArrayRef =
-                Arc::new(Float64Array::from_iter_values(rows.iter().map(|r| r.2[k])));
-            let item = Arc::new(Field::new("item", DataType::Float64, true));
-            let lengths = core::iter::repeat_n(1, rows.len());
-            let list = ListArray::new(item, OffsetBuffer::from_lengths(lengths), values, None);
-            let id = self.encoder.chunk_id();
-            let row_ids: Vec<RowId> = rows.iter().map(|_| self.encoder.row_id()).collect();
-            let chunk = Chunk::from_native_row_ids(
-                id,
-                format!("/metrics/{name}").into(),
-                None,
-                &row_ids,
-                timelines
-                    .into_iter()
-                    .map(|t| (*t.timeline().name(), t))
-                    .collect(),
-                core::iter::once((Scalars::descriptor_scalars(), list)).collect(),
-            )
-            .map_err(io::Error::other)?;
-            self.encoder.append(&self.store, &chunk)?;
+            let values = Float64Array::from_iter_values(rows.iter().map(|r| r.2[k]));
+            let each = OffsetBuffer::from_lengths(core::iter::repeat_n(1, rows.len()));
+            let column = lists(each, array(values));
+            let columns = vec![(Scalars::descriptor_scalars(), column)];
+            self.write_columns(&format!("/metrics/{name}"), &times, columns)?;
         }
         Ok(())
+    }
+
+    /// Writes rows that have been gathered by component; `times` are steps and simulated times in nanoseconds.
+    fn write_columns(
+        &mut self,
+        entity: &str,
+        times: &[(u64, i64)],
+        columns: Vec<Column>,
+    ) -> io::Result<()> {
+        let timelines = [
+            TimeColumn::new_sequence("step", times.iter().map(|t| t.0 as i64)),
+            TimeColumn::new_duration_nanos("sim_time", times.iter().map(|t| t.1)),
+        ];
+        let id = self.encoder.chunk_id();
+        let row_ids: Vec<RowId> = times.iter().map(|_| self.encoder.row_id()).collect();
+        let chunk = Chunk::from_native_row_ids(
+            id,
+            entity.into(),
+            None,
+            &row_ids,
+            timelines
+                .into_iter()
+                .map(|t| (*t.timeline().name(), t))
+                .collect(),
+            columns.into_iter().collect(),
+        );
+        self.encoder
+            .append(&self.store, &chunk.map_err(io::Error::other)?)
     }
 }
 
@@ -247,10 +267,7 @@ impl<W: Write> Recorder for RrdRecorder<W> {
             self.pending.bytes += size_of::<Metrics>();
         }
         if let Some(frame) = &snapshot.frame {
-            let time = TimePoint::default()
-                .with(Timeline::new_sequence("step"), snapshot.step as i64)
-                .with(Timeline::new_duration("sim_time"), nanoseconds);
-            self.record_frame(snapshot, frame, &time);
+            self.record_frame(snapshot, frame);
         }
         let pending = &mut self.pending;
         pending.snapshots += 1;
@@ -294,38 +311,6 @@ impl<W: Write> Recorder for RrdRecorder<W> {
             states: self.states,
         })
     }
-}
-
-/// Closed polygons.
-fn contour_strips(contours: &Contours, colors: Vec<Rgb>) -> LineStrips2D {
-    let strips = (0..contours.len()).map(|p| {
-        let polygon = contours.polygon(p);
-        let closed = polygon.iter().chain(polygon.first());
-        closed
-            .map(|v| [v.x as f32, v.y as f32])
-            .collect::<Vec<[f32; 2]>>()
-    });
-    LineStrips2D::new(strips).with_colors(colors.into_iter().map(color))
-}
-
-/// A segment a contact, width and colour by its force.
-fn contact_strips(network: &Network) -> LineStrips2D {
-    let strips = network
-        .segments
-        .iter()
-        .map(|ends| ends.map(|v| [v.x as f32, v.y as f32]));
-    let widths = network
-        .relative
-        .iter()
-        .map(|&r| Radius::new_scene_units(network.half_width(r) as f32));
-    let colors = network.relative.iter().map(|&r| color(Network::color(r)));
-    LineStrips2D::new(strips)
-        .with_radii(widths)
-        .with_colors(colors)
-}
-
-fn color([r, g, b]: Rgb) -> Color {
-    Color::from_rgb(r, g, b)
 }
 
 fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
