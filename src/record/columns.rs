@@ -29,10 +29,23 @@ pub(super) struct StripRows {
 }
 
 impl StripRows {
+    /// Room for as much as `other` holds: one batch is like the next.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            times: Vec::with_capacity(other.times.len()),
+            rows: Vec::with_capacity(other.rows.len()),
+            strips: Vec::with_capacity(other.strips.len()),
+            points: Vec::with_capacity(other.points.len() + other.points.len() / 8),
+            colors: Vec::with_capacity(other.colors.len()),
+            radii: Vec::with_capacity(other.radii.len()),
+        }
+    }
+
     /// Adds a strip to the row at hand.
     pub fn strip<'a>(&mut self, points: impl IntoIterator<Item = &'a Vec2>, [r, g, b]: Rgb) {
-        let points = points.into_iter().flat_map(|v| [v.x as f32, v.y as f32]);
-        self.points.extend(points);
+        for v in points {
+            self.points.extend_from_slice(&[v.x as f32, v.y as f32]);
+        }
         self.strips.push(self.points.len() / 2);
         self.colors.push(u32::from_be_bytes([r, g, b, 255]));
     }

@@ -3,6 +3,7 @@
 use crate::contact::Contacts;
 use crate::domain::Vec2;
 use core::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// Red, green, blue.
 pub(super) type Rgb = [u8; 3];
@@ -20,7 +21,7 @@ pub(super) fn particle_colors(radii: &[f64], contacts: &Contacts<'_>) -> Vec<Rgb
     let mean = pressure.iter().sum::<f64>() / radii.len() as f64;
     let color = |&p: &f64| {
         if p > 0.0 {
-            shade(colorous::VIRIDIS, 0.3 + 0.7 * (p / mean / 2.0).min(1.0))
+            VIRIDIS.at(0.3 + 0.7 * (p / mean / 2.0).min(1.0))
         } else {
             [120, 120, 120]
         }
@@ -71,11 +72,33 @@ impl Network {
 
     /// The colour of a contact with the relative force `r`.
     pub fn color(r: f64) -> Rgb {
-        shade(colorous::INFERNO, 0.45 + 0.5 * r / MOST)
+        INFERNO.at(0.45 + 0.5 * r / MOST)
     }
 }
 
-fn shade(map: colorous::Gradient, at: f64) -> Rgb {
-    let c = map.eval_continuous(at);
-    [c.r, c.g, c.b]
+/// A colour map in 256 steps: evaluating its spline for every particle and contact of a frame would cost more than
+/// drawing them.
+struct Shades(LazyLock<[Rgb; 256]>);
+
+impl Shades {
+    const fn of(make: fn() -> [Rgb; 256]) -> Self {
+        Self(LazyLock::new(make))
+    }
+
+    /// The colour at a place between 0 and 1.
+    fn at(&self, place: f64) -> Rgb {
+        // A conversion saturates.
+        self.0[usize::from((255.0 * place + 0.5) as u8)]
+    }
 }
+
+fn shades(map: colorous::Gradient) -> [Rgb; 256] {
+    core::array::from_fn(|k| {
+        let c = map.eval_continuous(k as f64 / 255.0);
+        [c.r, c.g, c.b]
+    })
+}
+
+static VIRIDIS: Shades = Shades::of(|| shades(colorous::VIRIDIS));
+static INFERNO: Shades = Shades::of(|| shades(colorous::INFERNO));
+

@@ -184,6 +184,8 @@ impl<W: Write> RrdRecorder<W> {
             last,
             ..
         } = core::mem::take(&mut self.pending);
+        self.pending.contours = StripRows::with_room_of(&contours);
+        self.pending.contacts = StripRows::with_room_of(&contacts);
         self.write_strips("/world/contours", contours)?;
         self.write_strips("/world/contacts", contacts)?;
         self.write_metrics(&metrics)?;

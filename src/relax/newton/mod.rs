@@ -10,9 +10,8 @@
 //! with `Δf` eliminated: `J Δr = −F`, `J` being the derivative of the net forces with the contact problem solved inside
 //! (`linear.rs`). It is solved only as far as the step is worth (an inexact Newton method: R. S. Dembo, S. C. Eisenstat and
 //! T. Steihaug, SIAM J. Numer. Anal. 19, 400 (1982)), by GMRES (`gmres.rs`), preconditioned with the sparse Cholesky factor of the
-//! stiffness of independent contacts (`stiffness.rs`): 10 to 30 products
-//! at N = 256 and 1024. Then the
-//! contact problem is solved at the new positions from `f + Δf`, which is its answer to second order.
+//! stiffness of independent contacts (`stiffness.rs`): 10 to 30 products at N = 256 and 1024. Then the contact problem is
+//! solved at the new positions from `f + Δf`, which is its answer to second order.
 //!
 //! `f_max` (γ) from about 1e-6 on, N = 256, by the test `newton_converges_quadratically_from_a_millionth`:
 //!
