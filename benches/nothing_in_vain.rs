@@ -317,12 +317,12 @@ fn pictures(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
         ),
         row(
             "contours of particles without a contact",
-            "the kernel: they are their circle, turned once",
+            "the evaluation: they are their circle, turned once",
             format!(
                 "{lonely} of {} particles at the end of this run",
                 packing.len()
             ),
-            "a_contact_free_particle_costs_no_kernel_evaluation",
+            "a_contact_free_particle_costs_no_evaluation",
         ),
         row(
             "no state",
