@@ -26,6 +26,8 @@ mod geometry;
 mod law;
 pub mod list;
 pub mod matrix;
+mod mend;
+mod patch;
 pub mod solver;
 mod tolerance;
 
