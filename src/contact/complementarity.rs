@@ -19,16 +19,17 @@
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
 
 use super::error::ContactError;
-use super::geometry::Kept;
+use super::geometry::{Kept, arrivals, rearrange};
 use super::images::second_image;
 use super::law::ContactLaw;
+use super::solver::LinearSolver;
 use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
 use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
-const WIDEST_BULGE: f64 = 5.0;
+pub(super) const WIDEST_BULGE: f64 = 5.0;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
 const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
@@ -43,7 +44,7 @@ pub(super) enum Offence {
 }
 
 impl Offence {
-    fn pair(self) -> [u32; 2] {
+    pub(super) fn pair(self) -> [u32; 2] {
         match self {
             Self::Drop(_, pair) | Self::Add(pair, _) => pair,
         }
@@ -55,13 +56,23 @@ impl ContactLaw {
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
-        let mut best = usize::MAX;
+        let (mut best, mut mends) = (usize::MAX, 3);
         let mut patience = PATIENCE;
         for _ in 0..most {
             self.sweep(packing)?;
             let count = self.offending.len();
             if count == 0 {
                 return Ok(());
+            }
+            if mends > 0 && self.is_mendable() {
+                mends -= 1;
+                if self.mend(packing) {
+                    self.assemble(packing);
+                    let (scale, worst) = (self.scale(), self.off.max(self.tolerated));
+                    self.residual = if scale > 0.0 { worst / scale } else { worst };
+                    return Ok(());
+                }
+                continue;
             }
             if count < best {
                 best = count;
@@ -79,6 +90,14 @@ impl ContactLaw {
             contacts: self.pairs.len(),
             sweeps: most,
         })
+    }
+
+    /// Whether few contacts offend, and the tolerance is one that a sum of residuals may be held against.
+    fn is_mendable(&self) -> bool {
+        let scale = self.scale();
+        matches!(self.solver, LinearSolver::ConjugateGradient(_))
+            && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
+            && 64 * self.offending.len() <= self.pairs.len()
     }
 
     /// Forces of the present set, and the pairs that offend, in the order of the list.
@@ -111,15 +130,19 @@ impl ContactLaw {
         }
         if !self.structured {
             self.list.rebuild(packing.len(), &self.pairs);
+            self.work.structures += 1;
             if self.refreshed {
                 self.geometry.exchange(packing, &self.list, &self.kept);
-            } else {
-                self.geometry.restructure(&self.list);
+                let (of, tension) = (&self.geometry, self.line_tension);
+                self.matrix
+                    .exchange(packing, &self.list, of, &self.exchanged, tension);
+                self.structured = true;
+                return;
             }
+            self.geometry.restructure(&self.list);
             let duplicate = self.geometry.duplicate();
             self.matrix
                 .restructure(packing, &self.list, duplicate, self.line_tension);
-            self.work.structures += 1;
         }
         if !self.refreshed {
             self.geometry.refresh(packing, &self.list);
@@ -176,6 +199,11 @@ impl ContactLaw {
             }
             largest = largest.max(*bulge);
         }
+        self.cover(packing, largest);
+    }
+
+    /// A neighbour list that covers bulges up to `largest`.
+    pub(super) fn cover(&mut self, packing: &Packing, largest: f64) {
         let skin = 0.3 * packing.largest_radius();
         if self
             .neighbors
@@ -183,6 +211,7 @@ impl ContactLaw {
         {
             self.parted = false;
         }
+        self.covered = largest;
     }
 
     /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
@@ -214,7 +243,7 @@ impl ContactLaw {
     }
 
     /// The pairs of the neighbour list that are not in the set.
-    fn part(&mut self) {
+    pub(super) fn part(&mut self) {
         if self.parted {
             return;
         }
@@ -234,6 +263,7 @@ impl ContactLaw {
     fn find_offences(&mut self, packing: &Packing, tolerance: f64) -> f64 {
         self.part();
         self.offending.clear();
+        self.tolerated = 0.0;
         let (radii, positions) = (packing.radii(), packing.positions());
         let domain = packing.domain();
         let mut worst: f64 = 0.0;
@@ -262,6 +292,8 @@ impl ContactLaw {
                 let compliance =
                     -G_AT_CONTACT * (radii[i] + radii[j]) / (2.0 * PI * self.line_tension);
                 self.offending.push(Offence::Add(pair, -gap / compliance));
+            } else {
+                self.tolerated = self.tolerated.max(-gap);
             }
         }
         if drops > 0 && self.offending.len() > drops {
@@ -288,31 +320,28 @@ impl ContactLaw {
             begin = end + usize::from(then.is_none());
             self.kept.push(Kept { range, then });
         }
+        self.exchanged.clear();
+        let pairs = self.offending[..count].iter().map(|o| o.pair());
+        self.exchanged.extend(pairs);
         let range = begin..self.pairs.len();
         self.kept.push(Kept { range, then: None });
-        let (pairs, forces) = &mut self.next;
-        pairs.clear();
-        forces.clear();
-        let mut offences = self.offending.iter();
-        for kept in &self.kept {
-            pairs.extend_from_slice(&self.pairs[kept.range.clone()]);
-            forces.extend_from_slice(&self.forces[kept.range.clone()]);
-            if let Some(Offence::Add(pair, guess)) = offences.next()
-                && kept.then.is_some()
-            {
-                pairs.push(*pair);
-                forces.push(*guess);
-            }
+        rearrange(&mut self.pairs, &self.kept, [0; 2]);
+        rearrange(&mut self.forces, &self.kept, 0.0);
+        let guesses = self.offending[..count].iter().filter_map(|o| match o {
+            Offence::Add(_, guess) => Some(guess),
+            Offence::Drop(..) => None,
+        });
+        for ((place, pair), guess) in arrivals(&self.kept).zip(guesses) {
+            self.pairs[place] = pair;
+            self.forces[place] = *guess;
         }
-        core::mem::swap(&mut self.pairs, pairs);
-        core::mem::swap(&mut self.forces, forces);
         self.structured = false;
         self.part_again(count);
     }
 
     /// The pairs of the neighbour list that are not in the set, after the first `count` offending ones were exchanged.
     fn part_again(&mut self, count: usize) {
-        const FEW: usize = 16;
+        const FEW: usize = 64;
         if count > FEW {
             self.parted = false;
         }

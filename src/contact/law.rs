@@ -6,6 +6,7 @@ use super::error::ContactError;
 use super::geometry::Kept;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
+use super::patch::Patch;
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::neighbors::NeighborList;
@@ -67,6 +68,8 @@ pub struct ContactLaw {
     pub(super) refreshed: bool,
     /// What the last exchange kept.
     pub(super) kept: Vec<Kept>,
+    /// The pairs that came or went in the last exchange.
+    pub(super) exchanged: Vec<[u32; 2]>,
     /// The neighbour list without `pairs`, and whether it is up to date.
     pub(super) others: Vec<[u32; 2]>,
     pub(super) parted: bool,
@@ -74,10 +77,14 @@ pub struct ContactLaw {
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
     pub(super) bulges: Vec<f64>,
+    /// The largest bulge that the neighbour list is known to cover at the present positions.
+    pub(super) covered: f64,
+    /// The largest overlap of contours outside the set that the tolerance lets pass (length).
+    pub(super) tolerated: f64,
+    pub(super) patch: Patch,
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) absurd: Option<(usize, f64)>,
     pub(super) offending: Vec<Offence>,
-    pub(super) next: (Vec<[u32; 2]>, Vec<f64>),
     /// The largest `|A f − δ|` (length).
     pub(super) off: f64,
     pub(super) residual: f64,
@@ -97,6 +104,10 @@ pub struct Work {
     pub sweeps: u64,
     /// Iterations of the linear solver.
     pub iterations: u64,
+    /// Exchanges of few contacts after which only the forces around them were solved for.
+    pub patches: u64,
+    /// Iterations of the linear solver on such patches.
+    pub patch_iterations: u64,
     /// Geometries computed of all contacts; after an exchange only that of new ones is.
     pub assemblies: u64,
     /// Structures of the contact set (lists, places in `A`) built.
@@ -141,14 +152,17 @@ impl ContactLaw {
             structured: false,
             refreshed: false,
             kept: Vec::new(),
+            exchanged: Vec::new(),
             others: Vec::new(),
             parted: false,
             slack: 0.0,
             image: Vec::new(),
             bulges: Vec::new(),
+            covered: 0.0,
+            tolerated: 0.0,
+            patch: Patch::default(),
             absurd: None,
             offending: Vec::new(),
-            next: (Vec::new(), Vec::new()),
             off: 0.0,
             residual: 0.0,
             work: Work::default(),

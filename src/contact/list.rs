@@ -107,6 +107,11 @@ impl ContactList {
         &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
     }
 
+    /// Number of contacts whose lower particle is in `particles`.
+    pub(crate) fn count(&self, particles: core::ops::Range<usize>) -> usize {
+        (self.first[particles.end] - self.first[particles.start]) as usize
+    }
+
     /// All pairs `[i, j]`, `i < j`, in the order of the list.
     ///
     /// ```

@@ -20,7 +20,7 @@ use core::f64::consts::PI;
 /// Stored particle by particle, as the sum above is written: a particle with `z` contacts gives a symmetric block of
 /// `z (z − 1)/2` entries, each computed and stored once for its two places, so the matrix is symmetric to the last bit.
 /// A product with a vector then reads half the numbers that rows would hold, and one index a contact and particle
-/// instead of one an entry. Blocks of one size stand together (within stretches of 2048 particles, to stay near each
+/// instead of one an entry. Blocks of one size stand together (within stretches of 256 particles, to stay near each
 /// other in memory), so that each size has a loop of its own without branches.
 ///
 /// # Example
@@ -53,6 +53,10 @@ pub struct ContactMatrix {
     contact: Vec<u32>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
+    /// Where the values of each particle's block begin, of those that have one.
+    value_of: Vec<u32>,
+    /// Room for [`exchange`](Self::exchange).
+    old: (Vec<f64>, Vec<u32>),
     /// The blocks of each contact's lower and higher particle, [`NO_BLOCK`] where it is the only contact.
     ends: Vec<[u32; 2]>,
 }
@@ -61,7 +65,7 @@ pub struct ContactMatrix {
 const NO_BLOCK: u32 = u32::MAX;
 
 /// Particles whose blocks are sorted by size together.
-const STRETCH: usize = 2048;
+const STRETCH: usize = 256;
 
 /// Blocks with more contacts than this share one stretch and have a run each.
 const LARGEST_SORTED: usize = 7;
@@ -126,11 +130,13 @@ impl ContactMatrix {
         self.ends.resize(contacts.len(), [NO_BLOCK; 2]);
         self.start.clear();
         self.contact.clear();
+        self.value_of.resize(radii.len(), 0);
         let mut end = 0;
         for (block, &p) in self.particle.iter().enumerate() {
             let numbers = duplicate.contacts(p as usize);
             let partners = duplicate.partners(p as usize);
             self.start.push([self.contact.len() as u32, end]);
+            self.value_of[p as usize] = end;
             self.contact.extend_from_slice(numbers);
             end += (numbers.len() * (numbers.len() - 1) / 2) as u32;
             for (&c, &q) in numbers.iter().zip(partners) {
@@ -139,6 +145,41 @@ impl ContactMatrix {
         }
         self.start.push([self.contact.len() as u32, end]);
         self.value.resize(end as usize, 0.0);
+    }
+
+    /// Takes over contacts that differ by some pairs, at the same positions: only the blocks of their particles are computed.
+    pub(crate) fn exchange(
+        &mut self,
+        packing: &Packing,
+        contacts: &ContactList,
+        geometry: &Geometry,
+        exchanged: &[[u32; 2]],
+        line_tension: f64,
+    ) {
+        core::mem::swap(&mut self.value, &mut self.old.0);
+        core::mem::swap(&mut self.value_of, &mut self.old.1);
+        self.restructure(packing, contacts, geometry.duplicate(), line_tension);
+        let (old, old_of) = (&self.old.0, &mut self.old.1);
+        for &p in exchanged.as_flattened() {
+            old_of[p as usize] = u32::MAX;
+        }
+        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let (mut block, mut values) = (0, &mut self.value[..]);
+        for &(z, count) in &self.runs {
+            let pairs = z * (z - 1) / 2;
+            for &p in &self.particle[block..block + count] {
+                let (own, rest) = values.split_at_mut(pairs);
+                values = rest;
+                let from = old_of[p as usize] as usize;
+                if let Some(old) = old.get(from..from + pairs) {
+                    own.copy_from_slice(old);
+                } else {
+                    let scale = -packing.radii()[p as usize] * per_radius;
+                    fill_block(scale, geometry.toward(p as usize), own);
+                }
+            }
+            block += count;
+        }
     }
 
     /// The order of the blocks: within each stretch of particles by size, then by particle.

@@ -27,6 +27,8 @@ mod images;
 mod law;
 pub mod list;
 pub mod matrix;
+mod mend;
+mod patch;
 pub mod solver;
 mod tolerance;
 

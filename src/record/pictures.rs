@@ -101,4 +101,3 @@ fn shades(map: colorous::Gradient) -> [Rgb; 256] {
 
 static VIRIDIS: Shades = Shades::of(|| shades(colorous::VIRIDIS));
 static INFERNO: Shades = Shades::of(|| shades(colorous::INFERNO));
-

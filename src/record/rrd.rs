@@ -27,8 +27,8 @@ use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array,
-    UInt32Array, UInt64Array,
+    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array, UInt32Array,
+    UInt64Array,
 };
 use rerun::external::arrow::buffer::OffsetBuffer;
 use rerun::external::arrow::datatypes::{DataType, Field};
