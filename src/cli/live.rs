@@ -9,7 +9,7 @@ pub struct LiveFlags {
     /// Start the rerun viewer (the program `rerun`) and show the run in it as it goes; a viewer that listens at PORT
     /// already is used.
     ///
-    /// The viewer is sent what the file gets, ten times a second. It neither slows the run nor stops it: at most 16 MiB of
+    /// The viewer is sent what the file gets, ten times a second. The run never waits for it: at most 16 MiB of
     /// steps wait for it, of which every other frame is dropped when more come. At the end, when the file is closed, it
     /// has 2 s to take what is left, and before that up to 10 s to come up.
     #[arg(

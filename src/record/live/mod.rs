@@ -13,8 +13,8 @@ use queue::{Closing, Queue};
 use rerun::external::re_uri::{ProxyUri, Scheme};
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
-use std::process::{Command, Stdio};
-use std::sync::Arc;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -39,8 +39,8 @@ const KNOCK: Duration = Duration::from_millis(200);
 #[derive(Clone, Debug)]
 pub struct Viewer {
     uri: ProxyUri,
-    /// Whether it was started for this run.
-    started: bool,
+    /// The program, if it was started for this run.
+    started: Option<Arc<Mutex<Child>>>,
 }
 
 impl Viewer {
@@ -64,10 +64,7 @@ impl Viewer {
         let uri: ProxyUri = url.parse().map_err(|_| wrong())?;
         // There is nobody to test encryption against.
         match uri.origin.scheme {
-            Scheme::RerunHttp => Ok(Self {
-                uri,
-                started: false,
-            }),
+            Scheme::RerunHttp => Ok(Self { uri, started: None }),
             Scheme::RerunHttps => Err(wrong()),
         }
     }
@@ -102,13 +99,24 @@ impl Viewer {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         match command.spawn() {
-            Ok(_) => {
-                viewer.started = true;
+            Ok(child) => {
+                viewer.started = Some(Arc::new(Mutex::new(child)));
                 Ok(viewer)
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(LiveError::Missing),
             Err(source) => Err(LiveError::Start { source }),
         }
+    }
+}
+
+impl Viewer {
+    /// Whether it was started for this run and may still come up. A program that hands over to another one ends with
+    /// success.
+    fn comes_up(&self) -> bool {
+        self.started.as_ref().is_some_and(|child| {
+            let mut child = child.lock().unwrap_or_else(PoisonError::into_inner);
+            !matches!(child.try_wait(), Ok(Some(status)) if !status.success())
+        })
     }
 }
 

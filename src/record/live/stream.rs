@@ -5,6 +5,7 @@ use super::queue::{Closing, Queue};
 use super::{Ended, FLUSH, STARTUP, Viewer};
 use prost::Message as _;
 use re_protos::log_msg::v1alpha1 as protocol;
+use re_protos::log_msg::v1alpha1::log_msg::Msg;
 use re_protos::sdk_comms::v1alpha1::WriteMessagesRequest;
 use re_protos::sdk_comms::v1alpha1::message_proxy_service_client::MessageProxyServiceClient;
 use rerun::external::re_log_encoding::rrd::{Decodable as _, MessageHeader, MessageKind};
@@ -44,9 +45,13 @@ async fn show(queue: &Queue, viewer: &Viewer, header: Header, sent: &mut u64) ->
         Ok(endpoint) => endpoint,
         Err(error) => return Ended::Lost(error.to_string()),
     };
-    let patience = if viewer.started { STARTUP } else { FLUSH };
+    let patience = if viewer.started.is_some() {
+        STARTUP
+    } else {
+        FLUSH
+    };
     let channel = tokio::select! {
-        channel = connect(queue, &endpoint, viewer.started) => channel,
+        channel = connect(queue, &endpoint, viewer) => channel,
         () = late(queue, patience) => None,
     };
     let Some(channel) = channel else {
@@ -73,13 +78,14 @@ async fn late(queue: &Queue, patience: Duration) {
     }
 }
 
-/// Asks for the viewer until it is there. At the end of the run, one that nobody has just started is not waited for.
-async fn connect(queue: &Queue, endpoint: &Endpoint, started: bool) -> Option<Channel> {
+/// Asks for the viewer until it is there. At the end of the run it is waited for only if it
+/// was started for this run.
+async fn connect(queue: &Queue, endpoint: &Endpoint, viewer: &Viewer) -> Option<Channel> {
     loop {
         if let Ok(channel) = endpoint.connect().await {
             return Some(channel);
         }
-        if started {
+        if viewer.comes_up() {
             sleep(RETRY).await;
         } else {
             tokio::select! {
@@ -203,7 +209,6 @@ impl Write for Outbox {
             // The header of the stream is shorter.
             return Ok(bytes.len());
         };
-        use protocol::log_msg::Msg;
         let header = MessageHeader::from_rrd_bytes(header).map_err(io::Error::other)?;
         let msg = match header.kind {
             MessageKind::SetStoreInfo => {
