@@ -6,6 +6,7 @@ mod convert;
 mod figure;
 mod flags;
 mod info;
+mod live;
 mod manual;
 mod output;
 mod record;
@@ -134,6 +135,11 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         ) => 2,
         _ => 1,
     }
+}
+
+fn warn(text: &str) {
+    // A warning that nobody can read is no failure.
+    let _ = writeln!(std::io::stderr(), "warning: {text}");
 }
 
 /// Writes a result to standard output; a closed pipe (`| head`) is no failure.

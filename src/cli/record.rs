@@ -1,8 +1,9 @@
 //! `softjam record`: relaxes a scene and records it.
 
 use super::flags::{RECORDING, SceneFlags};
+use super::live::LiveFlags;
 use super::output::{Output, open_with, same};
-use super::{Verdict, print};
+use super::{Verdict, print, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
@@ -13,7 +14,7 @@ use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start};
 use std::fmt::Write as _;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,6 +28,7 @@ Examples:
   softjam record scene.toml --channels metrics,state -o small.rrd
   softjam record --from broken.rrd -o rest.rrd      finish a run that was interrupted
   softjam record --mcap run.mcap                    for Foxglove; beside the .rrd with -o run.rrd
+  softjam record --particles 1024 --spawn           and look on
 Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd")]
 pub struct Arguments {
     #[command(flatten)]
@@ -59,6 +61,9 @@ pub struct Arguments {
     /// Replace an existing file.
     #[arg(long, short, help_heading = RECORDING)]
     force: bool,
+
+    #[command(flatten)]
+    live: LiveFlags,
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
@@ -96,11 +101,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         Writer::create_as(output.format, &output.path, arguments.force, header.clone())
     });
     let writers = writers.collect::<Result<Vec<_>, _>>()?;
+    let live = arguments.live.start(&header);
     phase.recording();
     let from = run.step();
     let bar = Progress::new(&scene, from);
     let start = Instant::now();
-    let recorded = record::record(&mut run, writers, &scene.channels, |run| {
+    let recorded = record::record_live(&mut run, writers, live.view(), &scene.channels, |run| {
         bar.show(run, start);
         phase.goes_on()
     });
@@ -114,6 +120,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         from,
         (disks, start.elapsed()),
     ))?;
+    live.finish(summary.outcome)?;
     let validity = Validity::of(&run.contacts(), run.packing().len(), scene.line_tension);
     if let Some(warning) = validity.warning() {
         warn(&warning);
@@ -150,11 +157,6 @@ fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordEr
         output.check(&inputs, arguments.force)?;
     }
     Ok(outputs)
-}
-
-fn warn(text: &str) {
-    // A warning that nobody can read is no failure.
-    let _ = writeln!(io::stderr(), "warning: {text}");
 }
 
 /// What Ctrl-C and SIGTERM find: nothing to lose while the disks relax, a recording to close afterwards.

@@ -23,13 +23,26 @@ pub(super) struct Encoder<W> {
     /// Bytes of the whole messages written so far.
     written: u64,
     buffer: Vec<u8>,
-    manifests: Vec<(StoreId, RrdManifestBuilder)>,
+    /// What the footer will list; a stream without one may go on for ever.
+    manifests: Option<Vec<(StoreId, RrdManifestBuilder)>>,
     ids: u128,
 }
 
 impl<W: Write> Encoder<W> {
-    /// Starts a stream.
-    pub fn new(mut sink: W) -> io::Result<Self> {
+    /// Starts a stream that lists its chunks at the end.
+    pub fn new(sink: W) -> io::Result<Self> {
+        Self::start(sink, Some(Vec::new()))
+    }
+
+    /// Starts a stream that is read as it comes, and keeps no list of its chunks.
+    pub fn unlisted(sink: W) -> io::Result<Self> {
+        Self::start(sink, None)
+    }
+
+    fn start(
+        mut sink: W,
+        manifests: Option<Vec<(StoreId, RrdManifestBuilder)>>,
+    ) -> io::Result<Self> {
         let mut buffer = Vec::new();
         StreamHeader {
             fourcc: RRD_FOURCC,
@@ -47,7 +60,7 @@ impl<W: Write> Encoder<W> {
             sink,
             written: buffer.len() as u64,
             buffer,
-            manifests: Vec::new(),
+            manifests,
             ids: 0,
         })
     }
@@ -125,15 +138,15 @@ impl<W: Write> Encoder<W> {
             len: self.buffer.len() as u64 - header,
         };
         self.written += self.buffer.len() as u64;
-        if let LogMsg::ArrowMsg(store, arrow) = message {
+        if let (LogMsg::ArrowMsg(store, arrow), Some(manifests)) = (message, &mut self.manifests) {
             let batch = re_sorbet::ChunkBatch::try_from(&arrow.batch).map_err(io::Error::other)?;
-            let known = self.manifests.iter().position(|(id, _)| id == store);
-            let place = known.unwrap_or(self.manifests.len());
+            let known = manifests.iter().position(|(id, _)| id == store);
+            let place = known.unwrap_or(manifests.len());
             if known.is_none() {
                 let manifest = RrdManifestBuilder::default();
-                self.manifests.push((store.clone(), manifest));
+                manifests.push((store.clone(), manifest));
             }
-            self.manifests[place]
+            manifests[place]
                 .1
                 .append(&batch, span, transport.byte_size_uncompressed())
                 .map_err(io::Error::other)?;
@@ -146,7 +159,7 @@ impl<W: Write> Encoder<W> {
         let mut footer = RrdFooter::default()
             .to_transport(())
             .map_err(io::Error::other)?;
-        for (store, manifest) in core::mem::take(&mut self.manifests) {
+        for (store, manifest) in self.manifests.take().into_iter().flatten() {
             let mut manifest = manifest.build(store).map_err(io::Error::other)?;
             let mut fields = manifest.sorbet_schema.fields().to_vec();
             fields.sort();

@@ -20,6 +20,7 @@
 mod blueprint;
 mod columns;
 mod encode;
+mod live;
 mod mcap;
 pub(crate) mod messages;
 mod pictures;
@@ -28,6 +29,7 @@ mod scene_update;
 mod sink;
 mod writer;
 
+pub use live::{Ended, Live, LiveError, Shown, Viewer};
 pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
 pub use writer::{Writer, Written};
@@ -326,7 +328,24 @@ fn recorded_up_to(intact: Option<u64>) -> String {
 /// See the example of the [module](self).
 pub fn record(
     run: &mut Relaxation,
+    writers: Vec<Writer>,
+    channels: &Channels,
+    watch: impl FnMut(&Relaxation) -> bool,
+) -> Result<Summary, RecordError> {
+    record_live(run, writers, None, channels, watch)
+}
+
+/// [`record`], and a viewer looks on; what becomes of the viewer does not concern the run.
+///
+/// # Errors
+///
+/// Those of [`record`].
+///
+/// See the example of [`Live`].
+pub fn record_live(
+    run: &mut Relaxation,
     mut writers: Vec<Writer>,
+    live: Option<&Live>,
     channels: &Channels,
     mut watch: impl FnMut(&Relaxation) -> bool,
 ) -> Result<Summary, RecordError> {
@@ -339,6 +358,9 @@ pub fn record(
             let snapshot = Arc::new(snapshot);
             for writer in &mut writers {
                 writer.send(Arc::clone(&snapshot))?;
+            }
+            if let Some(live) = live {
+                live.send(snapshot);
             }
         }
         if last {

@@ -115,10 +115,18 @@ impl<W: Write> RrdRecorder<W> {
     ///
     /// See the example of [`RrdRecorder`].
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
-        let mut encoder = Encoder::new(sink)?;
-        let recording = &recording_id(&header.scene);
+        let recording = recording_id(&header.scene);
+        Self::start(Encoder::new(sink)?, header, &recording)
+    }
+
+    /// The same messages under another id, for a viewer that takes them as they come.
+    pub(super) fn live(sink: W, header: Header, recording: &str) -> io::Result<Self> {
+        Self::start(Encoder::unlisted(sink)?, header, recording)
+    }
+
+    fn start(mut encoder: Encoder<W>, header: Header, recording: &str) -> io::Result<Self> {
         blueprint::write(&mut encoder, recording, header.packing.domain())?;
-        let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording.as_str());
+        let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
         encoder.open(&store)?;
         write_header(&mut encoder, &store, &header)?;
         Ok(Self {
@@ -174,8 +182,13 @@ impl<W: Write> RrdRecorder<W> {
         }
     }
 
+    /// Whether no batch is at hand.
+    pub(super) fn is_empty(&self) -> bool {
+        self.pending.snapshots == 0
+    }
+
     /// Writes the batch at hand.
-    fn flush(&mut self) -> io::Result<()> {
+    pub(super) fn flush(&mut self) -> io::Result<()> {
         let Pending {
             metrics,
             contours,
