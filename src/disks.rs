@@ -75,9 +75,10 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
-    let mut step = 0;
+    let skin = SKIN * packing.largest_radius();
+    let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
-        neighbors.update(packing, 0.0, SKIN * packing.largest_radius());
+        neighbors.update_after(packing, 0.0, skin, moved);
         disk_forces(packing, neighbors.pairs(), line_tension, &mut net);
         let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
@@ -98,6 +99,12 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
             packing.positions_mut(),
             domain,
         );
+        // A step uphill goes back first.
+        moved = if state.downhill > 0 {
+            state.dt * largest_force(&velocities)
+        } else {
+            f64::INFINITY
+        };
         step += 1;
     }
 }
