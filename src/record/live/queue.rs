@@ -134,7 +134,7 @@ impl Waiting {
     }
 
     /// Takes every other frame away, and leaves its metrics; where no two frames are left, every other snapshot. So what
-    /// is left covers the time that waits evenly, and a pass is rare.
+    /// is left is thinner the older it is, and a pass is rare.
     fn thin(&mut self) {
         let entries = core::mem::take(&mut self.snapshots);
         self.bytes = 0;
@@ -190,7 +190,7 @@ mod tests {
     use crate::scene::{Channels, Scene};
 
     #[test]
-    fn what_waits_is_bounded_covers_the_run_evenly_and_ends_with_the_newest() {
+    fn what_waits_is_bounded_thins_out_with_age_and_ends_with_the_newest() {
         let scene = Scene {
             particles: 256,
             ..Scene::default()
@@ -225,8 +225,17 @@ mod tests {
         let last = framed.last().expect("the newest frame");
         assert!(last.snapshot.step == 4 * frames && last.whole);
         assert_eq!(framed[0].snapshot.step, 0);
-        let count = framed.len() as u64;
-        assert!((frames / 25..frames / 9).contains(&count), "{count} frames");
+        // Half of what fits is the least that is left, beside the metrics.
+        let rows = (4 * frames) as usize * size(&at(0, false));
+        let bytes = framed.iter().map(|e| size(&e.snapshot)).sum::<usize>();
+        assert!(
+            bytes > (LIMIT - rows) / 2 - 2 * size(&at(0, true)),
+            "{bytes}"
+        );
+        // The older, the thinner.
+        let steps: Vec<u64> = framed.iter().map(|e| e.snapshot.step).collect();
+        let gaps: Vec<u64> = steps.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(gaps.windows(2).all(|w| w[0] >= w[1]), "{gaps:?}");
         for entry in &left {
             assert_eq!(
                 entry.whole,

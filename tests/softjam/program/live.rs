@@ -89,7 +89,7 @@ fn a_viewer_that_is_absent_silent_or_gone_changes_nothing() {
     let (leaver, flag) = listener();
     let visit = thread::spawn(move || {
         let (mut stream, _) = leaver.accept().expect("a connection");
-        stream.read_exact(&mut [0; 20_000]).expect("20 kB");
+        stream.read_exact(&mut vec![0; 20_000]).expect("20 kB");
     });
     let left = recorded(folder.path(), &[&flag]);
     visit.join().expect("the viewer that leaves");
