@@ -17,12 +17,12 @@ use std::f64::consts::PI;
 /// `a` from its centre: with corners of radius r and x = (a − r)/r, the area gives 1/r² = 1 + (2t/π) x + (t/π) x²,
 /// t = n tan(π/n), and the flat sides give f = 2 x tan(π/n).
 fn exact_force(n: f64, a: f64) -> f64 {
-    let t = n * (PI / n).tan();
+    let t = n * libm::tan(PI / n);
     // (1 + x)² = (a/r)² = a² (1 + (2t/π) x + (t/π) x²): a quadratic equation for x.
     let (p, q) = (1.0 - a * a * t / PI, 1.0 - a * a);
     // p x² + 2p x + q = 0
     let x = -1.0 + (1.0 - q / p).sqrt();
-    2.0 * x * (PI / n).tan()
+    2.0 * x * libm::tan(PI / n)
 }
 
 fn main() -> Result<(), RelaxError> {

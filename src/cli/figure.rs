@@ -7,6 +7,7 @@ use softjam::replay::{Event, Recording};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "a flag is a bool")]
 #[command(after_help = "\
 Examples:
   softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
@@ -70,7 +71,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     super::output::Output::named(output).check(&inputs, arguments.force)?;
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path));
-        figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
+        figure::relaxation(&named(&runs.collect::<anyhow::Result<Vec<_>>>()?))?
     } else {
         let [path] = arguments.files.as_slice() else {
             return Err(FigureError::Nothing(
@@ -89,7 +90,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 type Names = [String; 3];
 
 /// Each curve is called by what is not the same in all of them, or by its coverage.
-fn named(runs: Vec<(Names, Vec<(u64, f64)>)>) -> Vec<Fall> {
+fn named(runs: &[(Names, Vec<(u64, f64)>)]) -> Vec<Fall> {
     let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
     let shown: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
     let label = |names: &Names| {

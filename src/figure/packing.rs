@@ -304,7 +304,9 @@ impl Shades {
                 let pressed = pressure.iter().filter(|p| **p > 0.0).count().max(1);
                 let average = pressure.iter().sum::<f64>() / pressed as f64;
                 if average > 0.0 {
-                    pressure.iter_mut().for_each(|p| *p /= average);
+                    for p in &mut pressure {
+                        *p /= average;
+                    }
                 }
                 (pressure, 2.0, "p / ⟨p⟩", false)
             }

@@ -410,7 +410,7 @@ fn state(frame: &Frame, digest: &[u8; 32]) -> DynamicArchetype {
         .with_component_from_data("force", array(Float64Array::from(frame.forces.clone())))
         .with_component_from_data(
             "minimizer",
-            array(Float64Array::from(frame.minimizer.values().to_vec())),
+            array(Float64Array::from(frame.minimizer.values())),
         )
         .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())))
 }

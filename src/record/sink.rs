@@ -58,8 +58,7 @@ impl<W: Write> Sink<W> {
     /// Writes what was held back, its summary in order.
     pub fn close(&self) -> io::Result<()> {
         let mut state = self.state();
-        let end = sort_summary(core::mem::take(&mut state.buffer));
-        state.buffer = end.map_err(io::Error::other)?;
+        state.buffer = sort_summary(&state.buffer).map_err(io::Error::other)?;
         state.held = false;
         state.flush()
     }
@@ -100,7 +99,7 @@ impl<W: Write> Write for Sink<W> {
 const HEAD: usize = 9;
 
 /// Sorts the schemas and the channels in the end of a file: data end, summary, footer, magic.
-fn sort_summary(bytes: Vec<u8>) -> Result<Vec<u8>, &'static str> {
+fn sort_summary(bytes: &[u8]) -> Result<Vec<u8>, &'static str> {
     const WRONG: &str = "the summary is not what was expected";
     let mut records: Vec<&[u8]> = Vec::new();
     let mut rest = bytes.strip_suffix(MAGIC).ok_or(WRONG)?;

@@ -32,7 +32,7 @@ pub struct Comparison {
 /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// # let mut run = Relaxation::new(&scene).unwrap();
 /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-/// # record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
+/// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
 ///
 /// let (mut a, mut b) = (Recording::open(&path).unwrap(), Recording::open(&path).unwrap());
 /// let found = compare(&mut a, &mut b).unwrap();

@@ -83,7 +83,7 @@ struct Segment {
 /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// # let mut run = Relaxation::new(&scene).unwrap();
 /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-/// # record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
+/// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
 ///
 /// for way in [Way::Whole, Way::Segments(2)] {
 ///     let verdict = determinism(&mut Recording::open(&path).unwrap(), way, |_| {}).unwrap();

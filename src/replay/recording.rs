@@ -26,7 +26,7 @@ use std::path::Path;
 /// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
 /// let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-/// record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
+/// record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
 ///
 /// let recording = Recording::open(&path).unwrap();
 /// assert_eq!(recording.scene(), &scene);
@@ -171,7 +171,7 @@ impl Recording {
     /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
     /// # let mut run = Relaxation::new(&scene).unwrap();
     /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-    /// # record::record(&mut run, writer, &scene.channels, |_| true).unwrap();
+    /// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
     ///
     /// let mut recording = Recording::open(&path).unwrap();
     /// while let Some(state) = recording.next_state().unwrap() {

@@ -166,13 +166,14 @@ fn lengths_that_a_file_only_claims_are_not_believed() {
         copy[place..place + 8].copy_from_slice(&claim.to_le_bytes());
         let text = match open(&copy) {
             Err(error) => error.to_string(),
-            Ok(mut recording) => match recording.find_map(Result::err) {
-                Some(error) => error.to_string(),
-                None => {
+            Ok(mut recording) => {
+                if let Some(error) = recording.find_map(Result::err) {
+                    error.to_string()
+                } else {
                     assert!(!recording.is_closed());
                     "breaks off".to_owned()
                 }
-            },
+            }
         };
         assert!(
             ["claims to hold", "breaks off", "has no radii"]
