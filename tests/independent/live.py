@@ -49,7 +49,9 @@ def wait_for(port, seconds=60):
 
 def start(*arguments):
     """rerun and what it starts in turn form a group, which `stop` ends."""
-    process = subprocess.Popen(["rerun", *arguments], start_new_session=True,
+    # A shell ignores SIGINT for what it runs in the background, and its children inherit that.
+    listen = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)
+    process = subprocess.Popen(["rerun", *arguments], start_new_session=True, preexec_fn=listen,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     groups.add(process.pid)
     return process
