@@ -1,4 +1,6 @@
-"""The figure that both readers draw, and the bytes by which they are compared with each other and with softjam."""
+"""What both readers do with what they read: the figure, and the bytes by which they are compared with softjam."""
+
+import argparse
 
 import matplotlib
 
@@ -40,3 +42,20 @@ def write_bits(metrics, states, path):
                 ("minimizer", "<f8"),
             ):
                 file.write(state[name].astype(kind).tobytes())
+
+
+def show(read, about):
+    """Reads the recording that the command line names with `read` and draws it."""
+    arguments = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("recording")
+    arguments.add_argument("-o", "--output", default="recording.png")
+    arguments.add_argument("--bits", help="write every number read as little-endian bytes, to compare readers")
+    arguments = arguments.parse_args()
+    metrics, states = read(arguments.recording)
+    last = max(states)
+    f = states[last]["force"]
+    print(f"{len(states)} states, {len(metrics['f_max'])} steps of metrics")
+    print(f"step {last}: f_max = {metrics['f_max'][last]!r}, {len(f)} contacts, mean force {f.mean():.6e}")
+    plot(metrics["f_max"], f, arguments.output)
+    if arguments.bits:
+        write_bits(metrics, states, arguments.bits)

@@ -5,12 +5,10 @@ usage: read_mcap.py RUN.mcap [-o FIGURE.png] [--bits FILE]
 needs: pip install mcap mcap-protobuf-support numpy matplotlib
 """
 
-import argparse
-
 import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-from plot import plot, write_bits
+from plot import show
 
 
 def read(path):
@@ -35,16 +33,4 @@ def read(path):
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("recording")
-    arguments.add_argument("-o", "--output", default="recording.png")
-    arguments.add_argument("--bits", help="write every number read as little-endian bytes, to compare readers")
-    arguments = arguments.parse_args()
-    metrics, states = read(arguments.recording)
-    last = max(states)
-    f = states[last]["force"]
-    print(f"{len(states)} states, {len(metrics['f_max'])} steps of metrics")
-    print(f"step {last}: f_max = {metrics['f_max'][last]!r}, {len(f)} contacts, mean force {f.mean():.6e}")
-    plot(metrics["f_max"], f, arguments.output)
-    if arguments.bits:
-        write_bits(metrics, states, arguments.bits)
+    show(read, __doc__)

@@ -5,9 +5,7 @@ usage: read_rrd.py RUN.rrd [-o FIGURE.png] [--bits FILE]
 needs: pip install rerun-sdk==0.36.3 numpy matplotlib
 """
 
-import argparse
-
-from plot import plot, write_bits
+from plot import show
 from rerun.experimental import RrdReader
 
 
@@ -39,16 +37,4 @@ def read(path):
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("recording")
-    arguments.add_argument("-o", "--output", default="recording.png")
-    arguments.add_argument("--bits", help="write every number read as little-endian bytes, to compare readers")
-    arguments = arguments.parse_args()
-    metrics, states = read(arguments.recording)
-    last = max(states)
-    f = states[last]["force"]
-    print(f"{len(states)} states, {len(metrics['f_max'])} steps of metrics")
-    print(f"step {last}: f_max = {metrics['f_max'][last]!r}, {len(f)} contacts, mean force {f.mean():.6e}")
-    plot(metrics["f_max"], f, arguments.output)
-    if arguments.bits:
-        write_bits(metrics, states, arguments.bits)
+    show(read, __doc__)

@@ -22,69 +22,19 @@
 pub mod fire;
 pub mod frequency;
 pub mod newton;
+mod status;
+
+pub use status::{RelaxError, Status};
 
 use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
 use crate::force::{NetForces, Observables, largest_force};
-use crate::frame::{Frame, FrameError};
+use crate::frame::Frame;
 use crate::packing::Packing;
-use crate::scene::{Minimizer, Scene, SceneError, start};
+use crate::scene::{Minimizer, Scene, start};
 use fire::{Fire, FireState};
 use newton::{Attempt, Newton};
-
-/// How a relaxation stands.
-///
-/// ```
-/// assert_ne!(softjam::relax::Status::Running, softjam::relax::Status::Converged);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// Above the threshold, below the step limit.
-    Running,
-    /// `f_max` is not above the threshold and the contact law is fulfilled.
-    Converged,
-    /// The step limit came first.
-    StepLimit,
-    /// A step could not be made; see the error of [`Relaxation::advance`].
-    Failed,
-}
-
-/// Why a relaxation cannot go on.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RelaxError {
-    /// The scene makes no sense.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The contact problem at a step has no answer.
-    #[error("step {step}: {source}")]
-    Contact {
-        /// The step.
-        step: u64,
-        /// What went wrong.
-        source: ContactError,
-    },
-    /// A particle was thrown through the box: the time step is too long for this scene.
-    #[error(
-        "step {step}: particle {particle} moved by {distance:.3e} in one step of {dt:.3e}; choose a smaller dt_max than {dt_max:.3e}"
-    )]
-    TooFar {
-        /// The step.
-        step: u64,
-        /// The particle.
-        particle: usize,
-        /// How far it moved (length).
-        distance: f64,
-        /// The time step.
-        dt: f64,
-        /// The bound of the time step in use.
-        dt_max: f64,
-    },
-    /// The frame to go on from does not belong to the scene.
-    #[error("the frame does not belong to this scene: {0}")]
-    Frame(#[from] FrameError),
-}
 
 /// A packing on its way to mechanical equilibrium.
 ///
