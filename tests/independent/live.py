@@ -6,7 +6,8 @@
 3. `--spawn` starts that viewer; what it shows is looked at too.
 4. A viewer that is killed midway costs the run neither its file nor its time.
 
-usage: live.py SOFTJAM [FOLDER]    (pip install rerun-sdk==0.36.3 numpy matplotlib; mesa-vulkan-drivers, or a GPU)
+usage: live.py [--no-pictures] SOFTJAM [FOLDER]
+--no-pictures leaves 2 and 3 out, which need a machine that can draw.    (pip install rerun-sdk==0.36.3 numpy matplotlib; mesa-vulkan-drivers, or a GPU)
 """
 
 import atexit
@@ -23,8 +24,10 @@ import matplotlib.image
 import numpy as np
 import rerun.experimental as rerun
 
-softjam = Path(sys.argv[1]).resolve()
-folder = Path(sys.argv[2] if len(sys.argv) > 2 else tempfile.mkdtemp()).resolve()
+pictures = "--no-pictures" not in sys.argv
+arguments = [a for a in sys.argv[1:] if a != "--no-pictures"]
+softjam = Path(arguments[0]).resolve()
+folder = Path(arguments[1] if len(arguments) > 1 else tempfile.mkdtemp()).resolve()
 os.chdir(folder)
 
 
@@ -136,26 +139,27 @@ assert len(sent) > 20_000 and sent.keys() == received.keys(), f"{len(sent)} cell
 assert sent == received, [k for k in sent if sent[k] != received[k]][:5]
 print(f"received: all {len(received)} cells of {len({k[0] for k in received})} entities, bit for bit")
 
-# 2. A viewer, into which two runs go.
-port = free_port()
-viewer = start("--headless", "--port", str(port))
-wait_for(port)
-for _ in range(2):
-    record("-o", "run.rrd", "--connect", address(port))
-    print(f"viewer: {colours(port, 'connect.png'):.1%} of the picture is coloured")
-stop(viewer)
+if pictures:
+    # 2. A viewer, into which two runs go.
+    port = free_port()
+    viewer = start("--headless", "--port", str(port))
+    wait_for(port)
+    for _ in range(2):
+        record("-o", "run.rrd", "--connect", address(port))
+        print(f"viewer: {colours(port, 'connect.png'):.1%} of the picture is coloured")
+    stop(viewer)
 
-# 3. A viewer that softjam starts: `rerun` on its PATH, here without a window.
-real = subprocess.run(["sh", "-c", "command -v rerun"], capture_output=True, text=True, check=True).stdout.strip()
-Path("bin").mkdir(exist_ok=True)
-Path("bin/rerun").write_text(f'#!/bin/sh\necho $$ >"{folder}/spawned"\nexec "{real}" --headless "$@"\n')
-Path("bin/rerun").chmod(0o755)
-port = free_port()
-done, took = record("-o", "run.rrd", f"--spawn={port}", env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
-assert Path("run.rrd").read_bytes() == alone, "the file differs"
-assert "live view" in done.stdout, done.stdout + done.stderr
-groups.add(int(Path("spawned").read_text()))
-print(f"--spawn: {took:.1f} s with the viewer's start, {colours(port, 'spawn.png'):.1%} of the picture is coloured")
+    # 3. A viewer that softjam starts: `rerun` on its PATH, here without a window.
+    real = subprocess.run(["sh", "-c", "command -v rerun"], capture_output=True, text=True, check=True).stdout.strip()
+    Path("bin").mkdir(exist_ok=True)
+    Path("bin/rerun").write_text(f'#!/bin/sh\necho $$ >"{folder}/spawned"\nexec "{real}" --headless "$@"\n')
+    Path("bin/rerun").chmod(0o755)
+    port = free_port()
+    done, took = record("-o", "run.rrd", f"--spawn={port}", env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
+    assert Path("run.rrd").read_bytes() == alone, "the file differs"
+    assert "live view" in done.stdout, done.stdout + done.stderr
+    groups.add(int(Path("spawned").read_text()))
+    print(f"--spawn: {took:.1f} s with the viewer's start, {colours(port, 'spawn.png'):.1%} of the picture is coloured")
 
 # 4. A viewer that is killed in the middle of a longer run.
 longer = ["-N", "512", "--phi", "0.86", "--every", "1"]
