@@ -4,6 +4,7 @@ use super::{Verdict, print};
 use softjam::figure::{self, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -71,7 +72,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     super::output::Output::named(output).check(&inputs, arguments.force)?;
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path));
-        figure::relaxation(&named(&runs.collect::<anyhow::Result<Vec<_>>>()?))?
+        figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
     } else {
         let [path] = arguments.files.as_slice() else {
             return Err(FigureError::Nothing(
@@ -89,26 +90,33 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 /// What tells runs apart: coverage, number of particles, seed.
 type Names = [String; 3];
 
-/// Each curve is called by what is not the same in all of them, or by its coverage.
-fn named(runs: &[(Names, Vec<(u64, f64)>)]) -> Vec<Fall> {
+/// Names beyond this number cannot be told apart by their colours.
+const COLORS: usize = 6;
+
+/// Each curve is called by its coverage and by what else is not the same in all of them; samples of one coverage share
+/// a name, and with it a colour, where there would be too many.
+fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
-    let shown: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
-    let label = |names: &Names| {
-        shown
-            .iter()
-            .map(|k| names[*k].as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
+    let all: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
+    let label = |names: &Names, shown: &[usize]| {
+        let shown = shown.iter().map(|k| names[*k].as_str());
+        shown.collect::<Vec<_>>().join(", ")
     };
-    runs.iter()
-        .map(|(names, points)| Fall {
-            label: label(names),
-            points: points.clone(),
-        })
-        .collect()
+    let distinct: BTreeSet<String> = runs.iter().map(|(names, _)| label(names, &all)).collect();
+    let without_seed: Vec<usize> = all.iter().copied().filter(|k| *k != 2).collect();
+    let shown = if distinct.len() > COLORS {
+        without_seed
+    } else {
+        all
+    };
+    let named = |(names, fall): (Names, Fall)| Fall {
+        label: label(&names, &shown),
+        ..fall
+    };
+    runs.into_iter().map(named).collect()
 }
 
-fn fall(path: &Path) -> anyhow::Result<(Names, Vec<(u64, f64)>)> {
+fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
     let mut recording = Recording::open(path)?;
     let mut points = Vec::new();
     for event in recording.by_ref() {
@@ -133,7 +141,12 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Vec<(u64, f64)>)> {
         format!("N = {}", recording.radii().len()),
         format!("seed {}", recording.scene().seed),
     ];
-    Ok((names, points))
+    let fall = Fall {
+        label: String::new(),
+        points,
+        threshold: Some(recording.scene().threshold),
+    };
+    Ok((names, fall))
 }
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {

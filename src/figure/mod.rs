@@ -1,4 +1,4 @@
-//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`.
+//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`, curves of what you like.
 //!
 //! A figure is SVG text; [`write()`] makes a PNG of it where the file's name asks for one, with a font of its own, so that
 //! a picture is the same on every machine.
@@ -15,9 +15,11 @@
 //! # std::fs::remove_file(&path).unwrap();
 //! ```
 
+mod chart;
 mod packing;
 mod relaxation;
 
+pub use chart::{Axis, Curve, Mark, Scale, chart};
 pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation};
 
