@@ -76,7 +76,7 @@ fn picture(run: &Relaxation) -> String {
     );
     let l = packing.domain().lengths() * pixels;
     let mut svg = format!(
-        "<svg xmlns='http://www.w3.org/2000/svg' width='{:.0}' height='{:.0}'><rect width='100%' height='100%' fill='white'/>\n",
+        "<svg xmlns='http://www.w3.org/2000/svg' width='{:.0}' height='{:.0}'>\n<rect width='100%' height='100%' fill='white'/>\n<g id='packing'>\n",
         l.x, l.y
     );
     for p in 0..contours.len() {
@@ -86,6 +86,14 @@ fn picture(run: &Relaxation) -> String {
             let _ = write!(svg, "{:.1},{:.1} ", pixels * v.x, l.y - pixels * v.y);
         }
         svg += "'/>\n";
+    }
+    svg += "</g>\n";
+    // What crosses an edge of the box comes in at the other.
+    for (x, y) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+        for sign in [-1.0, 1.0] {
+            let (x, y) = (sign * f64::from(x) * l.x, sign * f64::from(y) * l.y);
+            let _ = writeln!(svg, "<use href='#packing' x='{x:.1}' y='{y:.1}'/>");
+        }
     }
     svg + "</svg>\n"
 }

@@ -233,6 +233,7 @@ fn draw(
 ) -> Result<(), Problem> {
     area.fill(&WHITE)?;
     let labels = (across.clone(), up.clone());
+    let corner = emptiest(&across, &up, curves);
     let mut sheet = ChartBuilder::on(area)
         .margin(14 * FINE)
         .margin_right(24 * FINE)
@@ -268,7 +269,7 @@ fn draw(
     }
     sheet
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(corner)
         .margin(10 * FINE)
         .background_style(WHITE.mix(0.85))
         .label_font((FONT, 14 * FINE))
@@ -276,6 +277,37 @@ fn draw(
         .draw()?;
     area.present()?;
     Ok(())
+}
+
+/// The corner in which a legend hides the fewest points.
+fn emptiest(across: &Ruler, up: &Ruler, curves: &[Curve]) -> SeriesLabelPosition {
+    // What a legend takes of the sheet, and more.
+    let (width, height) = (0.4, 0.25);
+    let part = |ruler: &Ruler, value| {
+        let at = ruler.scale.place(value)? - ruler.ends.start;
+        Some(at / (ruler.ends.end - ruler.ends.start))
+    };
+    let points = || curves.iter().flat_map(|c| &c.points);
+    let hidden = |right: bool, top: bool| {
+        let beside = |x: f64| if right { x > 1.0 - width } else { x < width };
+        let level = |y: f64| if top { y > 1.0 - height } else { y < height };
+        points()
+            .filter(|p| part(across, p.0).is_some_and(beside) && part(up, p.1).is_some_and(level))
+            .count()
+    };
+    let corners = [
+        (SeriesLabelPosition::UpperRight, hidden(true, true)),
+        (SeriesLabelPosition::UpperLeft, hidden(false, true)),
+        (SeriesLabelPosition::LowerRight, hidden(true, false)),
+        (SeriesLabelPosition::LowerLeft, hidden(false, false)),
+    ];
+    // The first of equals.
+    let [first, others @ ..] = corners;
+    let best = others.into_iter().fold(
+        first,
+        |best, other| if other.1 < best.1 { other } else { best },
+    );
+    best.0
 }
 
 fn one(
