@@ -15,6 +15,8 @@ use plotters::series::LineSeries;
 use plotters::style::{BLACK, Color, RGBColor, ShapeStyle, WHITE};
 
 /// How the numbers of an axis are spaced.
+///
+/// See the example of [`chart`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// Evenly.
@@ -25,6 +27,8 @@ pub enum Scale {
 }
 
 /// An axis of a [`chart`].
+///
+/// See the example of [`chart`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Axis {
     /// What it shows, with its unit; `f_max` is printed with its index.
@@ -34,6 +38,8 @@ pub struct Axis {
 }
 
 /// How a [`Curve`] is drawn.
+///
+/// See the example of [`chart`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mark {
     /// A line through the points.
@@ -46,6 +52,8 @@ pub enum Mark {
 }
 
 /// Points that belong together.
+///
+/// See the example of [`chart`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
     /// What it is called in the legend; curves of one name share a colour and a line of the legend.

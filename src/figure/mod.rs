@@ -34,6 +34,12 @@ const FONT: &str = "DejaVu Sans";
 const PIXELS: f32 = 2.0;
 
 /// Why a figure could not be made.
+///
+/// ```
+/// use softjam::figure::{FigureError, png, relaxation};
+/// assert!(matches!(relaxation(&[]), Err(FigureError::Nothing(_))));
+/// assert!(matches!(png("no picture"), Err(FigureError::Draw(_))));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {

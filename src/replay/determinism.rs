@@ -29,6 +29,8 @@ pub enum Way {
 }
 
 /// What a replay found.
+///
+/// See the example of [`determinism`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Determinism {
     /// Recorded states.
@@ -42,6 +44,12 @@ pub struct Determinism {
 }
 
 /// Why a replay came to no verdict.
+///
+/// ```
+/// use softjam::replay::ReplayError;
+/// let error = ReplayError::NoState { path: "run.rrd".to_owned() };
+/// assert!(error.to_string().contains("not replayed"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {

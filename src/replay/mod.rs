@@ -66,6 +66,13 @@ pub enum Event {
 }
 
 /// Why a recording cannot be read.
+///
+/// ```
+/// use softjam::replay::{ReadError, Recording};
+/// let error = Recording::open("no/such/run.rrd").err().unwrap();
+/// assert!(matches!(error, ReadError::Open { .. }));
+/// assert!(error.to_string().starts_with("cannot read no/such/run.rrd"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {

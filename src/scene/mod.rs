@@ -205,6 +205,13 @@ impl Default for Scene {
 }
 
 /// Why a scene makes no sense.
+///
+/// ```
+/// use softjam::scene::{Scene, SceneError};
+/// let error = Scene { phi: 1.7, ..Scene::default() }.validate().unwrap_err();
+/// assert!(matches!(&error, SceneError::Range { field, .. } if field == "phi"));
+/// assert!(error.to_string().starts_with("phi = 1.7 is outside"), "{error}");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
