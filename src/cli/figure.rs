@@ -14,7 +14,12 @@ Examples:
   softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
   softjam figure run.rrd --step 0 --disks -o disks.png    the undeformed disks of step 0
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
-  softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run")]
+  softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
+  softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
+  softjam figure run.rrd --color nothing --no-chains -o figure5b.svg                       and 5(b)
+
+Exit codes: 0 drawn, 1 could not be done (a damaged file, a folder that is not there), 2 the request makes no sense (a step that is
+not recorded, a file that is in the way)")]
 pub struct Arguments {
     /// The recording, .rrd or .mcap; with --fmax, as many as there are curves.
     #[arg(value_name = "RUN.rrd", required = true)]
@@ -24,7 +29,7 @@ pub struct Arguments {
     #[arg(long, short, value_name = "FIGURE.svg")]
     output: PathBuf,
 
-    /// Draw f_max against step instead of a packing.
+    /// Draw f_max (units of γ) against step instead of a packing, with the thresholds as dashed lines.
     #[arg(long, conflicts_with_all = ["step", "disks", "color", "no_chains"])]
     fmax: bool,
 
@@ -32,15 +37,15 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value = "last", value_parser = step)]
     step: Step,
 
-    /// Draw the undeformed disks instead of the contours.
+    /// Draw the undeformed disks of the step instead of the contours.
     #[arg(long)]
     disks: bool,
 
-    /// What the colour of a particle means: pressure, deformation or nothing.
+    /// What the colour of a particle means: pressure (Σf/2πR relative to its mean), deformation (max |ΔR|/R) or nothing.
     #[arg(long, value_name = "QUANTITY", default_value = "pressure", value_parser = super::flags::named::<ColorBy>)]
     color: ColorBy,
 
-    /// Leave the force chains out.
+    /// Leave out the force chains: lines between centres, as wide as the force.
     #[arg(long)]
     no_chains: bool,
 
@@ -152,9 +157,11 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let mut recording = Recording::open(path)?;
     let mut found: Option<Frame> = None;
+    let mut states = 0;
     for event in recording.by_ref() {
         if let Event::State(frame) = event? {
             let at = frame.step;
+            states += 1;
             if matches!(arguments.step, Step::Number(k) if at > k) {
                 break;
             }
@@ -163,7 +170,12 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     }
     let shown = path.display();
     let frame = match (found, arguments.step) {
-        (None, _) => Err(format!("{shown} holds no state to draw")),
+        (None, Step::Number(k)) if states > 0 => Err(format!(
+            "{shown} holds no state of step {k}, nor one before it"
+        )),
+        (None, _) => Err(format!(
+            "{shown} holds no state to draw; record it with --channels state,…"
+        )),
         (Some(frame), Step::Number(k)) if frame.step != k => Err(format!(
             "{shown} holds no state of step {k}; the nearest before it is {}. `softjam convert` with \
              --channels state=every:1 brings it back",

@@ -281,13 +281,13 @@ pub struct Summary {
 #[non_exhaustive]
 pub enum RecordError {
     /// The file exists and is not to be replaced.
-    #[error("{path} exists; say --force to replace it, or name another file with -o")]
+    #[error("{path} exists; say --force to replace it, or name another file")]
     Exists {
         /// Path of the file.
         path: String,
     },
     /// The file is one that the run reads from.
-    #[error("{path} is an input of this run; name another file with -o")]
+    #[error("{path} is what is read from; name another file to write")]
     Input {
         /// Path of the file.
         path: String,

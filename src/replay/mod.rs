@@ -95,7 +95,9 @@ pub enum ReadError {
         problem: String,
     },
     /// A file of another program, or one that breaks off before its scene.
-    #[error("{path} is not a softjam recording: it has no {missing}")]
+    #[error(
+        "{path} is not a softjam recording, or breaks off before it says so: it has no {missing}"
+    )]
     NotSoftjam {
         /// Path of the file.
         path: String,

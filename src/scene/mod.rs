@@ -19,6 +19,7 @@ mod fields;
 mod print;
 pub mod schedule;
 pub mod start;
+mod start_file;
 mod validate;
 
 pub use fields::SceneFields;
@@ -237,6 +238,16 @@ pub enum SceneError {
         /// Why not.
         why: String,
     },
+    /// A field makes no sense without another.
+    #[error("{field} = {value} needs {needs}")]
+    Needs {
+        /// The field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What it needs.
+        needs: String,
+    },
     /// The text is not a scene: a misspelt field, a value of the wrong kind, broken TOML.
     #[error("not a scene:\n{0}")]
     Toml(#[from] toml::de::Error),
@@ -273,7 +284,7 @@ pub enum SceneError {
         available_mib: u64,
     },
     /// The start file is not a packing.
-    #[error("start file {path}, line {line}: {problem}")]
+    #[error("start file {path}{}: {problem}", at_line(*line))]
     StartFile {
         /// Path of the file.
         path: String,
@@ -290,6 +301,14 @@ pub enum SceneError {
         /// The system's reason.
         source: std::io::Error,
     },
+}
+
+fn at_line(line: u64) -> String {
+    if line == 0 {
+        String::new()
+    } else {
+        format!(", line {line}")
+    }
 }
 
 impl Scene {
@@ -325,7 +344,7 @@ impl Scene {
             blake3: hash @ None,
         } = &mut self.start
         {
-            let bytes = start::read_file(path)?;
+            let bytes = start_file::read_file(path)?;
             *hash = Some(blake3::hash(&bytes).to_hex().to_string());
         }
         Ok(self)
