@@ -242,15 +242,18 @@ fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> 
             Ok(Origin::Frame(scene, packing, Box::new(frame)))
         }
         _ if last.is_none() && arguments.step.is_none() => {
-            anyhow::bail!(
-                "{} holds no state to go on from{}",
-                path.display(),
-                if recording.is_closed() {
-                    "; only a recording with --channels state,… can be taken up"
+            let closed = recording.is_closed();
+            Err(SceneError::Needs {
+                field: "from".to_owned(),
+                value: path.display().to_string(),
+                needs: if closed {
+                    "a recorded state, which only a recording with --channels state,… has"
+                        .to_owned()
                 } else {
-                    " before it breaks off"
-                }
-            )
+                    "a recorded state, and breaks off before the first".to_owned()
+                },
+            }
+            .into())
         }
         _ => Err(SceneError::Range {
             field: "step".to_owned(),

@@ -92,7 +92,10 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
         |(line, row): (u64, &str), problem: &str| wrong(line, format!("`{row}` {problem}"));
     let header = reader.headers().map_err(|e| wrong(0, e.to_string()))?;
     if header != ["x", "y", "radius"].as_slice() {
-        return Err(quoted(row(text, 0), "is not the header `x,y,radius`"));
+        return Err(match row(text, 0) {
+            (0, _) => wrong(0, "there is no header `x,y,radius`".into()),
+            other => quoted(other, "is not the header `x,y,radius`"),
+        });
     }
     let (mut positions, mut radii) = (Vec::new(), Vec::new());
     for record in reader.deserialize::<(f64, f64, f64)>() {
