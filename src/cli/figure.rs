@@ -4,6 +4,7 @@ use super::{Verdict, print};
 use softjam::figure::{self, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
+use softjam::scene::Start;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -92,7 +93,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     Ok(Verdict::Good)
 }
 
-/// What tells runs apart: coverage, number of particles, seed.
+/// What tells runs apart: coverage, number of particles, seed or start file.
 type Names = [String; 3];
 
 /// Names beyond this number cannot be told apart by their colours.
@@ -144,7 +145,13 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
     let names = [
         format!("φ = {:.3}", recording.coverage()),
         format!("N = {}", recording.radii().len()),
-        format!("seed {}", recording.scene().seed),
+        match &recording.scene().start {
+            Start::File { path, .. } => {
+                let name = Path::new(path).file_name().unwrap_or_default();
+                format!("from {}", name.display())
+            }
+            Start::Random | Start::Hexagonal => format!("seed {}", recording.scene().seed),
+        },
     ];
     let fall = Fall {
         label: String::new(),
