@@ -1,7 +1,9 @@
 //! Rows of line strips, gathered component by component: what a viewer gets most bytes of is copied least.
 
-use super::pictures::Rgb;
+use super::pictures::{Network, Rgb, particle_colors};
+use crate::contact::Contacts;
 use crate::domain::Vec2;
+use crate::droplet::contour::Contours;
 use rerun::external::arrow::array::{
     Array, ArrayRef, FixedSizeListArray, Float32Array, ListArray, UInt32Array,
 };
@@ -23,7 +25,7 @@ pub(super) struct StripRows {
     rows: Vec<usize>,
     /// Where the points of each strip end.
     strips: Vec<usize>,
-    points: Vec<f32>,
+    points: Vec<[f32; 2]>,
     colors: Vec<u32>,
     radii: Vec<f32>,
 }
@@ -41,18 +43,45 @@ impl StripRows {
         }
     }
 
-    /// Adds a strip to the row at hand.
-    pub fn strip<'a>(&mut self, points: impl IntoIterator<Item = &'a Vec2>, [r, g, b]: Rgb) {
-        for v in points {
-            self.points.extend_from_slice(&[v.x as f32, v.y as f32]);
-        }
-        self.strips.push(self.points.len() / 2);
-        self.colors.push(u32::from_be_bytes([r, g, b, 255]));
+    /// Adds the closed contours of all particles to the row at hand: their number of vertices, the first of each counted
+    /// once.
+    pub fn contours(
+        &mut self,
+        contours: &mut Contours,
+        radii: &[f64],
+        positions: &[Vec2],
+        contacts: &Contacts<'_>,
+        line_tension: f64,
+    ) -> usize {
+        let (before, strips) = (self.points.len(), &mut self.strips);
+        contours.trace(
+            radii,
+            positions,
+            contacts,
+            line_tension,
+            &mut self.points,
+            |points, first| {
+                points.push(points[first]);
+                strips.push(points.len());
+            },
+        );
+        let colors = particle_colors(radii, contacts);
+        self.colors.extend(colors.into_iter().map(rgba));
+        self.points.len() - before - radii.len()
     }
 
-    /// Half the width of the strip added last (length); either all strips of an entity have one or none.
-    pub fn half_width(&mut self, half_width: f64) {
-        self.radii.push(half_width as f32);
+    /// Adds the segments of a network to the row at hand.
+    pub fn network(&mut self, network: &Network) {
+        let single = |v: &Vec2| [v.x as f32, v.y as f32];
+        let ends = (1..=network.segments.len()).map(|k| self.points.len() + 2 * k);
+        self.strips.extend(ends);
+        self.points
+            .extend(network.segments.as_flattened().iter().map(single));
+        let relative = network.relative.iter();
+        self.colors
+            .extend(relative.clone().map(|&r| rgba(Network::color(r))));
+        self.radii
+            .extend(relative.map(|&r| network.half_width(r) as f32));
     }
 
     /// Closes the row at hand.
@@ -65,8 +94,12 @@ impl StripRows {
     pub fn into_columns(self) -> io::Result<Vec<Column>> {
         let rows = offsets(&self.rows)?;
         let point = Arc::new(Field::new("item", DataType::Float32, false));
-        let points =
-            FixedSizeListArray::new(point, 2, array(Float32Array::from(self.points)), None);
+        let points = FixedSizeListArray::new(
+            point,
+            2,
+            array(Float32Array::from(self.points.into_flattened())),
+            None,
+        );
         let item = Arc::new(Field::new("item", points.data_type().clone(), false));
         let strips = ListArray::new(item, offsets(&self.strips)?, array(points), None);
         let mut columns = vec![
@@ -87,7 +120,12 @@ impl StripRows {
     }
 }
 
-fn array(array: impl Array + 'static) -> ArrayRef {
+/// An opaque colour as rerun has it.
+fn rgba([r, g, b]: Rgb) -> u32 {
+    u32::from_be_bytes([r, g, b, 255])
+}
+
+pub(super) fn array(array: impl Array + 'static) -> ArrayRef {
     Arc::new(array)
 }
 
@@ -98,7 +136,7 @@ pub(super) fn lists(rows: OffsetBuffer<i32>, values: ArrayRef) -> ListArray {
 }
 
 /// Arrow counts with 32 bits.
-fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
+pub(super) fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
     let all = core::iter::once(&0).chain(ends);
     let narrow = all
         .map(|end| i32::try_from(*end))
@@ -106,7 +144,7 @@ fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
     let narrow = narrow.map_err(|_| {
         io::Error::new(
             io::ErrorKind::InvalidInput,
-            "more than 2^31 vertices in one batch; record fewer of them (--vertices) or no contours",
+            "more than 2^31 entries in one batch; record fewer vertices (--vertices) or no contours",
         )
     })?;
     Ok(OffsetBuffer::new(ScalarBuffer::from(narrow)))

@@ -11,39 +11,36 @@
 //! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless |
 //! | `/result` | `softjam.Result:converged`, `:steps`, `:f_max`, `:digest`; its absence means an unfinished run |
 //!
-//! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
+//! Rows are gathered into chunks of about two megabytes, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
-use super::columns::{Column, StripRows, lists};
+use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
-use super::pictures::{Network, particle_colors};
+use super::pictures::Network;
+use super::states::StateRows;
 use super::{
     FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written, blueprint, recording_id,
 };
 use crate::contact::FrameContacts;
-use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array, UInt32Array,
-    UInt64Array,
+    BooleanArray, Float64Array, StringArray, UInt8Array, UInt32Array, UInt64Array,
 };
 use rerun::external::arrow::buffer::OffsetBuffer;
-use rerun::external::arrow::datatypes::{DataType, Field};
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
 use rerun::{
     AsComponents, Color, DynamicArchetype, LineStrips2D, Radius, Scalars, TextDocument, TimeColumn,
-    TimePoint, Timeline, Transform3D,
+    TimePoint, Transform3D,
 };
 use std::io::{self, Write};
-use std::sync::Arc;
 
 /// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
 /// is killed loses no more than a batch.
-const BATCH_BYTES: usize = 1 << 20;
+const BATCH_BYTES: usize = 1 << 21;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 
@@ -91,7 +88,7 @@ struct Pending {
     metrics: Vec<MetricRow>,
     contours: StripRows,
     contacts: StripRows,
-    states: Vec<Row<DynamicArchetype>>,
+    states: StateRows,
     bytes: usize,
     snapshots: usize,
     first: Option<u64>,
@@ -100,11 +97,6 @@ struct Pending {
 
 /// A step, its simulated time in nanoseconds and its metrics.
 type MetricRow = (u64, i64, Metrics);
-
-struct Row<T> {
-    time: TimePoint,
-    data: T,
-}
 
 impl<W: Write> RrdRecorder<W> {
     /// Starts a recording: blueprint, scene, box, radii.
@@ -148,23 +140,20 @@ impl<W: Write> RrdRecorder<W> {
             let contacts = contacts.view();
             let radii = self.packing.radii();
             if snapshot.contours {
-                self.contours
-                    .draw(radii, &frame.positions, &contacts, self.line_tension);
                 let rows = &mut self.pending.contours;
-                for (p, color) in particle_colors(radii, &contacts).into_iter().enumerate() {
-                    let polygon = self.contours.polygon(p);
-                    rows.strip(polygon.iter().chain(polygon.first()), color);
-                }
+                let vertices = rows.contours(
+                    &mut self.contours,
+                    radii,
+                    &frame.positions,
+                    &contacts,
+                    self.line_tension,
+                );
                 rows.end_row(snapshot.step, snapshot.nanoseconds);
-                self.pending.bytes += 8 * self.contours.vertices();
+                self.pending.bytes += 8 * vertices;
             }
             if snapshot.contacts {
-                let network = Network::of(&frame.positions, radii, &contacts);
                 let rows = &mut self.pending.contacts;
-                for (segment, &relative) in network.segments.iter().zip(&network.relative) {
-                    rows.strip(segment, Network::color(relative));
-                    rows.half_width(network.half_width(relative));
-                }
+                rows.network(&Network::of(&frame.positions, radii, &contacts));
                 rows.end_row(snapshot.step, snapshot.nanoseconds);
                 self.pending.bytes += 24 * contacts.pairs.len();
             }
@@ -173,11 +162,9 @@ impl<W: Write> RrdRecorder<W> {
             let digest = frame.digest();
             self.digests.update(&digest);
             self.states += 1;
-            let time = TimePoint::default()
-                .with(Timeline::new_sequence("step"), snapshot.step as i64)
-                .with(Timeline::new_duration("sim_time"), snapshot.nanoseconds);
-            let data = state(frame, &digest);
-            self.pending.states.push(Row { time, data });
+            self.pending
+                .states
+                .push(snapshot.nanoseconds, frame, &digest);
             self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
         }
     }
@@ -199,30 +186,17 @@ impl<W: Write> RrdRecorder<W> {
         } = core::mem::take(&mut self.pending);
         self.pending.contours = StripRows::with_room_of(&contours);
         self.pending.contacts = StripRows::with_room_of(&contacts);
+        self.pending.states = StateRows::with_room_of(&states);
         self.write_strips("/world/contours", contours)?;
         self.write_strips("/world/contacts", contacts)?;
         self.write_metrics(&metrics)?;
-        self.write_rows("/state", states)?;
+        let times = states.times.clone();
+        self.write_columns("/state", &times, states.into_columns()?)?;
         self.intact = last.or(self.intact);
         Ok(())
     }
 
-    fn write_rows<T: AsComponents>(&mut self, entity: &str, rows: Vec<Row<T>>) -> io::Result<()> {
-        if rows.is_empty() {
-            return Ok(());
-        }
-        let mut builder = Chunk::builder_with_id(self.encoder.chunk_id(), entity);
-        for row in rows {
-            builder = builder.with_archetype(self.encoder.row_id(), row.time, &row.data);
-        }
-        self.encoder
-            .append(&self.store, &builder.build().map_err(io::Error::other)?)
-    }
-
     fn write_strips(&mut self, entity: &str, rows: StripRows) -> io::Result<()> {
-        if rows.times.is_empty() {
-            return Ok(());
-        }
         let times = rows.times.clone();
         self.write_columns(entity, &times, rows.into_columns()?)
     }
@@ -249,6 +223,9 @@ impl<W: Write> RrdRecorder<W> {
         times: &[(u64, i64)],
         columns: Vec<Column>,
     ) -> io::Result<()> {
+        if times.is_empty() {
+            return Ok(());
+        }
         let timelines = [
             TimeColumn::new_sequence("step", times.iter().map(|t| t.0 as i64)),
             TimeColumn::new_duration_nanos("sim_time", times.iter().map(|t| t.1)),
@@ -328,10 +305,6 @@ impl<W: Write> Recorder for RrdRecorder<W> {
     }
 }
 
-fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
-    Arc::new(array)
-}
-
 /// Scene, axes, box and radii: what does not change.
 fn write_header<W: Write>(
     encoder: &mut Encoder<W>,
@@ -394,28 +367,4 @@ fn write_header<W: Write>(
         encoder.single(store, entity, TimePoint::default(), data)?;
     }
     Ok(())
-}
-
-/// The lossless state.
-fn state(frame: &Frame, digest: &[u8; 32]) -> DynamicArchetype {
-    let pairs_of = |v: &[Vec2]| {
-        let flat = Float64Array::from_iter_values(v.iter().flat_map(|p| [p.x, p.y]));
-        pairs(DataType::Float64, array(flat))
-    };
-    let contacts = UInt32Array::from_iter_values(frame.contacts.iter().flatten().copied());
-    DynamicArchetype::new("softjam.State")
-        .with_component_from_data("position", pairs_of(&frame.positions))
-        .with_component_from_data("velocity", pairs_of(&frame.velocities))
-        .with_component_from_data("contact", pairs(DataType::UInt32, array(contacts)))
-        .with_component_from_data("force", array(Float64Array::from(frame.forces.clone())))
-        .with_component_from_data(
-            "minimizer",
-            array(Float64Array::from(frame.minimizer.values())),
-        )
-        .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())))
-}
-
-fn pairs(of: DataType, flat: ArrayRef) -> ArrayRef {
-    let item = Arc::new(Field::new("item", of, false));
-    array(FixedSizeListArray::new(item, 2, flat, None))
 }
