@@ -345,7 +345,7 @@ impl Outline {
             a_c += c * (d.angle - PI);
             a_s += s_j * (d.angle - PI);
         }
-        let mut arc = Arc {
+        let mut sector = Sector {
             centre: self.centre,
             radius: self.radius - s,
             p: a_c - 0.5 * s_s,
@@ -356,23 +356,27 @@ impl Outline {
         let mut drawn = 0;
         for (contact, f) in contacts {
             let end = before(circle, contact.angle).max(drawn);
-            vertices.extend(circle[drawn..end].iter().map(move |d| arc.vertex::<V>(d)));
+            vertices.extend(
+                circle[drawn..end]
+                    .iter()
+                    .map(move |d| sector.vertex::<V>(d)),
+            );
             if tips {
-                vertices.push(arc.vertex::<V>(contact));
+                vertices.push(sector.vertex::<V>(contact));
             }
             drawn = end;
             let turn = 2.0 * PI * self.scale * f;
-            arc.p += turn * contact.cos;
-            arc.q += turn * contact.sin;
+            sector.p += turn * contact.cos;
+            sector.q += turn * contact.sin;
         }
-        vertices.extend(circle[drawn..].iter().map(move |d| arc.vertex::<V>(d)));
+        vertices.extend(circle[drawn..].iter().map(move |d| sector.vertex::<V>(d)));
     }
 }
 
 /// A contour between two neighbouring contacts: `ρ(θ) = R − S + sin θ (P − θ S_c) − cos θ (Q − θ S_s)`, all in units of
 /// length.
 #[derive(Clone, Copy)]
-struct Arc {
+struct Sector {
     centre: Vec2,
     /// `R − S`.
     radius: f64,
@@ -384,7 +388,7 @@ struct Arc {
     s_s: f64,
 }
 
-impl Arc {
+impl Sector {
     #[inline(always)]
     fn vertex<V: Vertex>(&self, d: &Direction) -> V {
         let along_sin = self.p - d.angle * self.s_c;
