@@ -98,7 +98,7 @@ pub(super) fn lists(rows: OffsetBuffer<i32>, values: ArrayRef) -> ListArray {
 }
 
 /// Arrow counts with 32 bits.
-fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
+pub(super) fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
     let all = core::iter::once(&0).chain(ends);
     let narrow = all
         .map(|end| i32::try_from(*end))

@@ -3,41 +3,44 @@
 //! | entity | content |
 //! | --- | --- |
 //! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program`, `:from_step` |
-//! | `/world`, `/world/box` | y up; the periodic box |
-//! | `/world/contours` | particle polygons, coloured by the pressure on the particle |
-//! | `/world/contacts` | a segment a contact between the centres, width and colour by the force |
+//! | `/world`, `/world/box`, `/world/legend` | y up; the periodic box; what colours and widths mean |
+//! | `/world/contours` | particle polygons, coloured by the pressure `p_i = Σ_j f_ij / 2πR_i` on the particle |
+//! | `/world/contours/images` | those that cross an edge, at its other side; `softjam.Image:particle` is the particle |
+//! | `/world/particles` | a point a particle; `softjam.Particle:pressure_contacts_deformation_rattler` has `p_i` (γ/length), the number of contacts with `f > 0`, `max abs ΔR/R`, and 1 for a rattler |
+//! | `/world/disks` | the undeformed disks of the frame, hidden until asked for |
+//! | `/world/contacts` | a segment a contact between the centres, width and colour by the force; `softjam.Contact:pair`, `:force` (γ), `:overlap` (`δ_ij`, length) |
+//! | `/world/contacts/images` | those that cross an edge, at its other side; `softjam.Image:contact` is the contact |
 //! | `/metrics/*` | one scalar each |
 //! | `/particles` | `softjam.Particles:radius`, `:box` (the sides) |
 //! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless |
 //! | `/result` | `softjam.Result:converged`, `:steps`, `:f_max`, `:digest`; its absence means an unfinished run |
+//!
+//! Images, points and disks belong to the channel of the contours or contacts that they stand beside, which are instance by
+//! instance the particles and the contacts of the state.
 //!
 //! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
 use super::columns::{Column, StripRows, lists};
 use super::encode::Encoder;
-use super::pictures::{Network, particle_colors};
-use super::{
-    FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written, blueprint, recording_id,
-};
-use crate::contact::FrameContacts;
+use super::hover::{ContactRows, ParticleRows};
+use super::images::{ImageRows, shifts_of_polygon, shifts_of_segment};
+use super::pictures::{Network, Particles};
+use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
+use crate::contact::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array, UInt32Array,
-    UInt64Array,
+    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, UInt8Array, UInt32Array, UInt64Array,
 };
 use rerun::external::arrow::buffer::OffsetBuffer;
 use rerun::external::arrow::datatypes::{DataType, Field};
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
-use rerun::{
-    AsComponents, Color, DynamicArchetype, LineStrips2D, Radius, Scalars, TextDocument, TimeColumn,
-    TimePoint, Timeline, Transform3D,
-};
+use rerun::{AsComponents, DynamicArchetype, Scalars, TimeColumn, TimePoint, Timeline};
 use std::io::{self, Write};
 use std::sync::Arc;
 
@@ -90,7 +93,11 @@ pub struct RrdRecorder<W> {
 struct Pending {
     metrics: Vec<MetricRow>,
     contours: StripRows,
+    contour_images: ImageRows,
+    particles: ParticleRows,
     contacts: StripRows,
+    contact_images: ImageRows,
+    contact_numbers: ContactRows,
     states: Vec<Row<DynamicArchetype>>,
     bytes: usize,
     snapshots: usize,
@@ -125,10 +132,10 @@ impl<W: Write> RrdRecorder<W> {
     }
 
     fn start(mut encoder: Encoder<W>, header: Header, recording: &str) -> io::Result<Self> {
-        blueprint::write(&mut encoder, recording, header.packing.domain())?;
+        blueprint::write(&mut encoder, recording)?;
         let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
         encoder.open(&store)?;
-        write_header(&mut encoder, &store, &header)?;
+        header::write(&mut encoder, &store, &header)?;
         Ok(Self {
             encoder,
             store,
@@ -145,28 +152,11 @@ impl<W: Write> RrdRecorder<W> {
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
         if snapshot.contours || snapshot.contacts {
             let contacts = FrameContacts::of(&self.packing, frame);
-            let contacts = contacts.view();
-            let radii = self.packing.radii();
             if snapshot.contours {
-                self.contours
-                    .draw(radii, &frame.positions, &contacts, self.line_tension);
-                let rows = &mut self.pending.contours;
-                for (p, color) in particle_colors(radii, &contacts).into_iter().enumerate() {
-                    let polygon = self.contours.polygon(p);
-                    rows.strip(polygon.iter().chain(polygon.first()), color);
-                }
-                rows.end_row(snapshot.step, snapshot.nanoseconds);
-                self.pending.bytes += 8 * self.contours.vertices();
+                self.draw_particles(snapshot, frame, &contacts.view());
             }
             if snapshot.contacts {
-                let network = Network::of(&frame.positions, radii, &contacts);
-                let rows = &mut self.pending.contacts;
-                for (segment, &relative) in network.segments.iter().zip(&network.relative) {
-                    rows.strip(segment, Network::color(relative));
-                    rows.half_width(network.half_width(relative));
-                }
-                rows.end_row(snapshot.step, snapshot.nanoseconds);
-                self.pending.bytes += 24 * contacts.pairs.len();
+                self.draw_contacts(snapshot, frame, &contacts.view());
             }
         }
         if snapshot.state {
@@ -182,6 +172,60 @@ impl<W: Write> RrdRecorder<W> {
         }
     }
 
+    fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let (domain, radii) = (self.packing.domain(), self.packing.radii());
+        self.contours
+            .draw(radii, &frame.positions, contacts, self.line_tension);
+        let seen = Particles::of(radii, contacts);
+        let Pending {
+            contours,
+            contour_images: images,
+            particles,
+            ..
+        } = &mut self.pending;
+        for (p, (&centre, &radius)) in frame.positions.iter().zip(radii).enumerate() {
+            let polygon = self.contours.polygon(p);
+            let color = seen.color(p);
+            contours.strip(polygon.iter().chain(polygon.first()), color);
+            shifts_of_polygon(domain, polygon, |shift| {
+                images.image(polygon.iter().chain(polygon.first()), shift, color, p);
+            });
+            let shape = (centre, radius, polygon);
+            particles.particle(&seen, shape, self.line_tension, p);
+        }
+        contours.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        particles.end_row();
+        self.pending.bytes += 8 * self.contours.vertices() + 40 * radii.len();
+    }
+
+    fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let network = Network::of(&frame.positions, self.packing.radii(), contacts);
+        let domain = self.packing.domain();
+        let Pending {
+            contacts: rows,
+            contact_images: images,
+            contact_numbers: numbers,
+            ..
+        } = &mut self.pending;
+        for (c, (segment, &relative)) in network.segments.iter().zip(&network.relative).enumerate()
+        {
+            let (color, half_width) = (Network::color(relative), network.half_width(relative));
+            rows.strip(segment, color);
+            rows.half_width(half_width);
+            shifts_of_segment(domain, segment, |shift| {
+                images.image(segment, shift, color, c);
+                images.strips.half_width(half_width);
+            });
+        }
+        rows.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        numbers.row(contacts, self.line_tension);
+        self.pending.bytes += 40 * contacts.pairs.len();
+    }
+
     /// Whether no batch is at hand.
     pub(super) fn is_empty(&self) -> bool {
         self.pending.snapshots == 0
@@ -189,21 +233,18 @@ impl<W: Write> RrdRecorder<W> {
 
     /// Writes the batch at hand.
     pub(super) fn flush(&mut self) -> io::Result<()> {
-        let Pending {
-            metrics,
-            contours,
-            contacts,
-            states,
-            last,
-            ..
-        } = core::mem::take(&mut self.pending);
-        self.pending.contours = StripRows::with_room_of(&contours);
-        self.pending.contacts = StripRows::with_room_of(&contacts);
-        self.write_strips("/world/contours", contours)?;
-        self.write_strips("/world/contacts", contacts)?;
-        self.write_metrics(&metrics)?;
-        self.write_rows("/state", states)?;
-        self.intact = last.or(self.intact);
+        let pending = core::mem::take(&mut self.pending);
+        self.pending.contours = StripRows::with_room_of(&pending.contours);
+        self.pending.contacts = StripRows::with_room_of(&pending.contacts);
+        self.write_particles(pending.contours, pending.contour_images, pending.particles)?;
+        self.write_contacts(
+            pending.contacts,
+            pending.contact_images,
+            pending.contact_numbers,
+        )?;
+        self.write_metrics(&pending.metrics)?;
+        self.write_rows("/state", pending.states)?;
+        self.intact = pending.last.or(self.intact);
         Ok(())
     }
 
@@ -219,12 +260,33 @@ impl<W: Write> RrdRecorder<W> {
             .append(&self.store, &builder.build().map_err(io::Error::other)?)
     }
 
-    fn write_strips(&mut self, entity: &str, rows: StripRows) -> io::Result<()> {
-        if rows.times.is_empty() {
-            return Ok(());
-        }
-        let times = rows.times.clone();
-        self.write_columns(entity, &times, rows.into_columns()?)
+    fn write_particles(
+        &mut self,
+        contours: StripRows,
+        images: ImageRows,
+        particles: ParticleRows,
+    ) -> io::Result<()> {
+        let times = contours.times.clone();
+        let (points, disks) = particles.into_columns()?;
+        self.write_columns("/world/contours", &times, contours.into_columns()?)?;
+        let images = images.into_columns("softjam.Image:particle")?;
+        self.write_columns("/world/contours/images", &times, images)?;
+        self.write_columns("/world/particles", &times, points)?;
+        self.write_columns("/world/disks", &times, disks)
+    }
+
+    fn write_contacts(
+        &mut self,
+        contacts: StripRows,
+        images: ImageRows,
+        numbers: ContactRows,
+    ) -> io::Result<()> {
+        let times = contacts.times.clone();
+        let mut columns = contacts.into_columns()?;
+        columns.extend(numbers.into_columns()?);
+        self.write_columns("/world/contacts", &times, columns)?;
+        let images = images.into_columns("softjam.Image:contact")?;
+        self.write_columns("/world/contacts/images", &times, images)
     }
 
     fn write_metrics(&mut self, rows: &[MetricRow]) -> io::Result<()> {
@@ -249,6 +311,9 @@ impl<W: Write> RrdRecorder<W> {
         times: &[(u64, i64)],
         columns: Vec<Column>,
     ) -> io::Result<()> {
+        if times.is_empty() {
+            return Ok(());
+        }
         let timelines = [
             TimeColumn::new_sequence("step", times.iter().map(|t| t.0 as i64)),
             TimeColumn::new_duration_nanos("sim_time", times.iter().map(|t| t.1)),
@@ -328,72 +393,8 @@ impl<W: Write> Recorder for RrdRecorder<W> {
     }
 }
 
-fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
+pub(super) fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
     Arc::new(array)
-}
-
-/// Scene, axes, box and radii: what does not change.
-fn write_header<W: Write>(
-    encoder: &mut Encoder<W>,
-    store: &StoreId,
-    header: &Header,
-) -> io::Result<()> {
-    let packing = &header.packing;
-    let toml = header.scene.to_toml();
-    let l = packing.domain().lengths();
-    let text = format!(
-        "# Deformable particles\n\n\
-         Morse–Witten model, recorded by {PROGRAM}.\n\n\
-         | | |\n| --- | --- |\n\
-         | particles | {} |\n| coverage φ | {:.6} |\n| box | {:.6} × {:.6} |\n| line tension γ | {} |\n| threshold on f_max | {:e} γ |\n\n\
-         ```toml\n{toml}```\n",
-        packing.len(),
-        packing.coverage(),
-        l.x,
-        l.y,
-        header.scene.line_tension,
-        header.scene.threshold,
-    );
-    let document = TextDocument::from_markdown(text);
-    let scene = DynamicArchetype::new("softjam.Scene")
-        .with_component_from_data("toml", array(StringArray::from(vec![toml])))
-        .with_component_from_data(
-            "format_version",
-            array(UInt32Array::from(vec![FORMAT_VERSION])),
-        )
-        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])))
-        .with_component_from_data(
-            "from_step",
-            array(UInt64Array::from(vec![header.from_step])),
-        );
-    let particles = DynamicArchetype::new("softjam.Particles")
-        .with_component_from_data(
-            "radius",
-            array(Float64Array::from(packing.radii().to_vec())),
-        )
-        .with_component_from_data("box", array(Float64Array::from(vec![l.x, l.y])));
-    // Rerun's 2D views have y down, a packing has it up.
-    let up = Transform3D::from_mat3x3([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
-    let (x, y) = (l.x as f32, l.y as f32);
-    let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
-    let frame = LineStrips2D::new([corners])
-        .with_colors([Color::from_rgb(140, 140, 140)])
-        .with_radii([Radius::new_ui_points(1.0)]);
-    let outline = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.1)]);
-    let graph = LineStrips2D::update_fields().with_draw_order(31.0);
-    let everywhere: [(&str, &dyn AsComponents); 7] = [
-        ("/scene", &document),
-        ("/scene", &scene),
-        ("/particles", &particles),
-        ("/world", &up),
-        ("/world/box", &frame),
-        ("/world/contours", &outline),
-        ("/world/contacts", &graph),
-    ];
-    for (entity, data) in everywhere {
-        encoder.single(store, entity, TimePoint::default(), data)?;
-    }
-    Ok(())
 }
 
 /// The lossless state.

@@ -1,0 +1,117 @@
+//! What stands beside the pictures for whoever points at one of them: numbers of particles and of contacts.
+//!
+//! The viewer lists the values of an instance where it is hovered, if the entity has no more than three columns with a
+//! value for each instance, and else when it is selected. A particle therefore has its numbers in one column of four,
+//! beside its place and its colour.
+
+use super::cells::{Cells, own};
+use super::columns::Column;
+use super::pictures::Particles;
+use crate::contact::Contacts;
+use crate::domain::Vec2;
+use rerun::{Ellipses2D, Points2D};
+use std::io;
+
+/// How bright the middle of a particle is beside its contour: force chains run across it.
+const BRIGHTNESS: f64 = 0.5;
+
+/// The four numbers of a particle, in the order of their cell.
+const PARTICLE: &str = "softjam.Particle:pressure_contacts_deformation_rattler";
+
+/// Rows of particles in the making, each a point at its centre.
+#[derive(Default)]
+pub(super) struct ParticleRows {
+    centres: Cells<f32, 2>,
+    colors: Cells<u32, 1>,
+    numbers: Cells<f32, 4>,
+}
+
+impl ParticleRows {
+    /// Adds the next particle, at `centre` and of undeformed `radius` (lengths), with the vertices of its contour;
+    /// `line_tension` is γ.
+    pub fn particle(
+        &mut self,
+        particles: &Particles,
+        (centre, radius, contour): (Vec2, f64, &[Vec2]),
+        line_tension: f64,
+        p: usize,
+    ) {
+        self.centres.push([centre.x as f32, centre.y as f32]);
+        let [r, g, b] = particles.color(p).map(middle);
+        self.colors.push([u32::from_be_bytes([r, g, b, 255])]);
+        self.numbers.push([
+            (particles.pressure[p] / line_tension) as f32,
+            particles.contacts[p] as f32,
+            deformation(centre, radius, contour) as f32,
+            f32::from(!particles.held[p]),
+        ]);
+    }
+
+    /// Closes the row at hand.
+    pub fn end_row(&mut self) {
+        self.centres.end_row();
+        self.colors.end_row();
+        self.numbers.end_row();
+    }
+
+    /// The components of `/world/particles`, and those of `/world/disks`.
+    pub fn into_columns(self) -> io::Result<(Vec<Column>, Vec<Column>)> {
+        let disks = self.centres.clone();
+        let particles = vec![
+            self.centres.into_column(Points2D::descriptor_positions())?,
+            self.colors.into_column(Points2D::descriptor_colors())?,
+            self.numbers.into_column(own(PARTICLE))?,
+        ];
+        let disks = vec![disks.into_column(Ellipses2D::descriptor_centers())?];
+        Ok((particles, disks))
+    }
+}
+
+fn middle(part: u8) -> u8 {
+    (BRIGHTNESS * f64::from(part) + 0.5) as u8
+}
+
+/// `max |ΔR|/R` over the vertices of a contour; with a vertex on each contact angle, where the dents are deepest, that is
+/// over the contour.
+fn deformation(centre: Vec2, radius: f64, contour: &[Vec2]) -> f64 {
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for v in contour {
+        let squared = (v - centre).norm_squared();
+        least = least.min(squared);
+        most = most.max(squared);
+    }
+    let off = |squared: f64| (squared.sqrt() / radius - 1.0).abs();
+    off(least).max(off(most))
+}
+
+/// Rows of the numbers of contacts in the making, in the order of the contacts.
+#[derive(Default)]
+pub(super) struct ContactRows {
+    pairs: Cells<u32, 2>,
+    forces: Cells<f32, 1>,
+    overlaps: Cells<f32, 1>,
+}
+
+impl ContactRows {
+    /// Adds a row; `line_tension` is γ.
+    pub fn row(&mut self, contacts: &Contacts<'_>, line_tension: f64) {
+        for (c, &pair) in contacts.pairs.iter().enumerate() {
+            self.pairs.push(pair);
+            self.forces
+                .push([(contacts.forces[c] / line_tension) as f32]);
+            self.overlaps.push([contacts.overlaps[c] as f32]);
+        }
+        self.pairs.end_row();
+        self.forces.end_row();
+        self.overlaps.end_row();
+    }
+
+    /// The components that stand beside those of `/world/contacts`.
+    pub fn into_columns(self) -> io::Result<[Column; 3]> {
+        Ok([
+            self.pairs.into_column(own("softjam.Contact:pair"))?,
+            self.forces.into_column(own("softjam.Contact:force"))?,
+            self.overlaps.into_column(own("softjam.Contact:overlap"))?,
+        ])
+    }
+}

@@ -1,0 +1,108 @@
+//! What crosses the edge of the periodic box, drawn whole on the other side as well.
+//!
+//! A shape that reaches over an edge has images in the neighbouring boxes, and one of them reaches into this box from the
+//! other side. Without it the box has holes along two of its edges. Images are entities of their own, so that particle
+//! `i` stays instance `i` of `/world/contours` and contact `c` instance `c` of `/world/contacts`.
+
+use super::cells::{Cells, own};
+use super::columns::{Column, StripRows};
+use super::pictures::Rgb;
+use crate::domain::{Domain, Vec2};
+use std::io;
+
+/// The shifts by a period that bring at least one of `vertices` into the open box, but for none at all: none for most
+/// shapes, one for a shape across an edge, up to three for one across a corner.
+pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[Vec2], mut each: impl FnMut(Vec2)) {
+    let l = domain.lengths();
+    let (mut least, mut most) = (l, Vec2::zeros());
+    for v in vertices {
+        least = least.inf(v);
+        most = most.sup(v);
+    }
+    around(l, least, most, |shift| {
+        let inside = |v: &Vec2| {
+            let (x, y) = (v.x + shift.x, v.y + shift.y);
+            x > 0.0 && x < l.x && y > 0.0 && y < l.y
+        };
+        if vertices.iter().any(inside) {
+            each(shift);
+        }
+    });
+}
+
+/// The shifts by a period that bring a part of `segment` into the open box, but for none at all.
+pub(super) fn shifts_of_segment(domain: Domain, &[a, b]: &[Vec2; 2], mut each: impl FnMut(Vec2)) {
+    let l = domain.lengths();
+    around(l, a.inf(&b), a.sup(&b), |shift| {
+        // Two convex shapes are apart if one of their sides separates them: for the sides of the box `around` has asked.
+        let middle = 0.5 * (a + b) + shift - 0.5 * l;
+        let half = 0.5 * (b - a);
+        let reach = 0.5 * (l.x * half.y.abs() + l.y * half.x.abs());
+        if half.perp(&middle).abs() < reach {
+            each(shift);
+        }
+    });
+}
+
+/// The shifts by a period that bring the rectangle between `least` and `most` into the open box, but for none at all.
+fn around(l: Vec2, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2)) {
+    if least.x >= 0.0 && least.y >= 0.0 && most.x <= l.x && most.y <= l.y {
+        return;
+    }
+    for x in [0.0, -l.x, l.x] {
+        for y in [0.0, -l.y, l.y] {
+            let meets =
+                least.x + x < l.x && least.y + y < l.y && most.x + x > 0.0 && most.y + y > 0.0;
+            if meets && (x != 0.0 || y != 0.0) {
+                each(Vec2::new(x, y));
+            }
+        }
+    }
+}
+
+/// How bright an image is beside what it is the image of.
+const BRIGHTNESS: f64 = 0.65;
+
+/// The colour of the image of something that has the colour `rgb`.
+pub(super) fn dim(rgb: Rgb) -> Rgb {
+    rgb.map(|part| (BRIGHTNESS * f64::from(part) + 0.5) as u8)
+}
+
+/// Rows of images in the making.
+#[derive(Default)]
+pub(super) struct ImageRows {
+    pub strips: StripRows,
+    /// What each is the image of: the number of a particle or of a contact.
+    pub of: Cells<u32, 1>,
+    shifted: Vec<Vec2>,
+}
+
+impl ImageRows {
+    /// Adds the image of `points` of number `of`, moved by `shift`; `points` have the colour `rgb`.
+    pub fn image<'a>(
+        &mut self,
+        points: impl IntoIterator<Item = &'a Vec2>,
+        shift: Vec2,
+        rgb: Rgb,
+        of: usize,
+    ) {
+        self.shifted.clear();
+        self.shifted.extend(points.into_iter().map(|v| v + shift));
+        self.strips.strip(&self.shifted, dim(rgb));
+        self.of.push([of as u32]);
+    }
+
+    /// Closes the row at hand.
+    pub fn end_row(&mut self, step: u64, nanoseconds: i64) {
+        self.strips.end_row(step, nanoseconds);
+        self.of.end_row();
+    }
+
+    /// The components of all rows; the numbers of what they are images of are the component `of`.
+    pub fn into_columns(self, of: &'static str) -> io::Result<Vec<Column>> {
+        let of = self.of.into_column(own(of))?;
+        let mut columns = self.strips.into_columns()?;
+        columns.push(of);
+        Ok(columns)
+    }
+}
