@@ -11,7 +11,7 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
 use rerun::external::re_sdk_types::blueprint::components::{
     ContainerKind, LinkAxis, PanelState, PlayState, RootContainer,
 };
-use rerun::{AsComponents, TimePoint, Timeline};
+use rerun::{AsComponents, Color, SeriesLines, TimePoint, Timeline};
 use std::io::{self, Write};
 
 /// A view: its number, its kind, its title, and the entities it shows.
@@ -21,6 +21,8 @@ struct View {
     title: &'static str,
     origin: &'static str,
     contents: &'static [&'static str],
+    /// The colour of its curve, if it plots one.
+    curve: [u8; 3],
 }
 
 const PACKING: View = View {
@@ -29,6 +31,7 @@ const PACKING: View = View {
     title: "Packing: pressure on the particles, force chains",
     origin: "/",
     contents: &["+ /world/**"],
+    curve: [0; 3],
 };
 
 /// The plot above, and those that stand side by side below it.
@@ -39,6 +42,7 @@ const PLOTS: [View; 4] = [
         title: "log₁₀ of f_max / γ, over steps",
         origin: "/metrics",
         contents: &["+ /metrics/log10_f_max"],
+        curve: [255, 170, 60],
     },
     View {
         number: 4,
@@ -46,6 +50,7 @@ const PLOTS: [View; 4] = [
         title: "Z",
         origin: "/metrics",
         contents: &["+ /metrics/coordination"],
+        curve: [100, 190, 255],
     },
     View {
         number: 3,
@@ -53,6 +58,7 @@ const PLOTS: [View; 4] = [
         title: "Pressure (γ/length)",
         origin: "/metrics",
         contents: &["+ /metrics/pressure"],
+        curve: [80, 220, 120],
     },
     View {
         number: 6,
@@ -60,6 +66,7 @@ const PLOTS: [View; 4] = [
         title: "Energy (γ·length)",
         origin: "/metrics",
         contents: &["+ /metrics/energy"],
+        curve: [250, 220, 80],
     },
 ];
 
@@ -69,6 +76,7 @@ const SCENE: View = View {
     title: "Scene",
     origin: "/scene",
     contents: &["+ /scene"],
+    curve: [0; 3],
 };
 
 impl View {
@@ -120,6 +128,11 @@ pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::
                 .with_link(LinkAxis::Independent)
                 .with_view_range(everything),
         )?;
+        let [r, g, b] = plot.curve;
+        let curve = SeriesLines::new()
+            .with_colors([Color::from_rgb(r, g, b)])
+            .with_widths([2.0]);
+        log(&format!("{}/defaults", plot.path()), &curve)?;
         // One curve a plot, whose title names it.
         log(
             &format!("{}/PlotLegend", plot.path()),

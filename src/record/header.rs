@@ -7,22 +7,14 @@ use crate::scene::Start;
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
-    AsComponents, Color, DynamicArchetype, Ellipses2D, LineStrips2D, Points2D, Radius, SeriesLines,
-    TextDocument, TimePoint, Transform3D,
+    AsComponents, Color, DynamicArchetype, Ellipses2D, LineStrips2D, Points2D, Radius,
+    RecordingInfo, TextDocument, TimePoint, Transform3D,
 };
 use std::io::{self, Write};
 
 /// The radius of a particle's point, in radii of the smallest particle: one size for all, so that it is not taken for the
 /// particle.
 const POINT: f64 = 0.8;
-
-/// The colours of the plotted metrics.
-const CURVES: [(&str, [u8; 3]); 4] = [
-    ("log10_f_max", [255, 170, 60]),
-    ("coordination", [100, 190, 255]),
-    ("pressure", [80, 220, 120]),
-    ("energy", [250, 220, 80]),
-];
 
 /// Writes the header into a store.
 pub(super) fn write<W: Write>(
@@ -35,6 +27,14 @@ pub(super) fn write<W: Write>(
     };
     let (packing, channels) = (&header.packing, &header.scene.channels);
     let l = packing.domain().lengths();
+    // What the viewer lists the recording as.
+    let name = format!(
+        "N = {}, φ = {:.3}, seed {}",
+        packing.len(),
+        packing.coverage(),
+        header.scene.seed
+    );
+    put("/__properties", &RecordingInfo::new().with_name(name))?;
     put("/scene", &TextDocument::from_markdown(text(header)))?;
     put("/scene", &scene(header))?;
     let particles = DynamicArchetype::new("softjam.Particles")
@@ -83,14 +83,6 @@ pub(super) fn write<W: Write>(
         let order = |order: f32| LineStrips2D::update_fields().with_draw_order(order);
         put("/world/contacts", &order(31.0))?;
         put("/world/contacts/images", &order(30.0))?;
-    }
-    if channels.metrics.is_on() {
-        for (name, [r, g, b]) in CURVES {
-            let curve = SeriesLines::new()
-                .with_colors([Color::from_rgb(r, g, b)])
-                .with_widths([2.0]);
-            put(&format!("/metrics/{name}"), &curve)?;
-        }
     }
     legend::write(header, put)
 }
@@ -154,12 +146,14 @@ fn text(header: &Header) -> String {
             missing.join(", no ")
         );
     }
-    text += "| in the picture | |\n| --- | --- |\n";
+    if channels.contours.is_on() || channels.contacts.is_on() {
+        text += "| in the picture | |\n| --- | --- |\n";
+    }
     if channels.contours.is_on() {
         text += "| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
              | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
              | gray | rattler: fewer than three contacts that bear a force |\n\
-             | point in it | hover it for its number, pressure (γ/length), contacts, max abs ΔR/R, rattler (1) or not (0) |\n\
+             | disk in it | hover it for its number, p (γ/length), number of contacts Z, max abs ΔR/R |\n\
              | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n";
     }
     if channels.contacts.is_on() {

@@ -1,10 +1,10 @@
 //! What stands beside the pictures for whoever points at one of them: numbers of particles and of contacts.
 //!
 //! The viewer lists the values of an instance where it is hovered, if the entity has no more than three columns with a
-//! value for each instance, and else when it is selected. A particle therefore has its numbers in one column of four,
-//! beside its place and its colour.
+//! value for each instance, and else when it is selected. It cuts lists of numbers short, but no text. A particle therefore
+//! has its numbers in one line of text, beside its place and its colour; in full they follow from the state.
 
-use super::cells::{Cells, own};
+use super::cells::{Cells, Texts, own};
 use super::columns::Column;
 use super::pictures::Particles;
 use crate::contact::Contacts;
@@ -15,19 +15,25 @@ use std::io;
 /// How bright the middle of a particle is beside its contour: force chains run across it.
 const BRIGHTNESS: f64 = 0.5;
 
-/// The four numbers of a particle, in the order of their cell.
-const PARTICLE: &str = "softjam.Particle:pressure_contacts_deformation_rattler";
-
 /// Rows of particles in the making, each a point at its centre.
 #[derive(Default)]
 pub(super) struct ParticleRows {
     centres: Cells<f32, 2>,
     colors: Cells<u32, 1>,
-    numbers: Cells<f32, 4>,
+    numbers: Texts,
 }
 
 impl ParticleRows {
-    /// Adds the next particle, at `centre` and of undeformed `radius` (lengths), with the vertices of its contour;
+    /// Room for as much as `other` holds: one batch is like the next.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            centres: Cells::with_room_of(&other.centres),
+            colors: Cells::with_room_of(&other.colors),
+            numbers: Texts::with_room_of(&other.numbers),
+        }
+    }
+
+    /// Adds the next particle, at `centre` and of undeformed `radius` (lengths), with the vertices of its contour: `p 0.125, Z 5, ΔR/R 0.0346`;
     /// `line_tension` is γ.
     pub fn particle(
         &mut self,
@@ -39,12 +45,17 @@ impl ParticleRows {
         self.centres.push([centre.x as f32, centre.y as f32]);
         let [r, g, b] = particles.color(p).map(middle);
         self.colors.push([u32::from_be_bytes([r, g, b, 255])]);
-        self.numbers.push([
-            (particles.pressure[p] / line_tension) as f32,
-            particles.contacts[p] as f32,
-            deformation(centre, radius, contour) as f32,
-            f32::from(!particles.held[p]),
-        ]);
+        let numbers = &mut self.numbers;
+        numbers.push("p ");
+        numbers.push_number(particles.pressure[p] / line_tension);
+        numbers.push(", Z ");
+        numbers.push_count(particles.contacts[p]);
+        numbers.push(", ΔR/R ");
+        numbers.push_number(deformation(centre, radius, contour));
+        if !particles.held[p] {
+            numbers.push(", rattler");
+        }
+        numbers.end_cell();
     }
 
     /// Closes the row at hand.
@@ -60,7 +71,7 @@ impl ParticleRows {
         let particles = vec![
             self.centres.into_column(Points2D::descriptor_positions())?,
             self.colors.into_column(Points2D::descriptor_colors())?,
-            self.numbers.into_column(own(PARTICLE))?,
+            self.numbers.into_column(own("softjam.Particle:numbers"))?,
         ];
         let disks = vec![disks.into_column(Ellipses2D::descriptor_centers())?];
         Ok((particles, disks))
@@ -93,6 +104,15 @@ pub(super) struct ContactRows {
 }
 
 impl ContactRows {
+    /// Room for as much as `other` holds: one batch is like the next.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            pairs: Cells::with_room_of(&other.pairs),
+            forces: Cells::with_room_of(&other.forces),
+            overlaps: Cells::with_room_of(&other.overlaps),
+        }
+    }
+
     /// Adds a row; `line_tension` is γ.
     pub fn row(&mut self, contacts: &Contacts<'_>, line_tension: f64) {
         for (c, &pair) in contacts.pairs.iter().enumerate() {

@@ -78,6 +78,15 @@ pub(super) struct ImageRows {
 }
 
 impl ImageRows {
+    /// Room for as much as `other` holds: one batch is like the next.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            strips: StripRows::with_room_of(&other.strips),
+            of: Cells::with_room_of(&other.of),
+            shifted: Vec::new(),
+        }
+    }
+
     /// Adds the image of `points` of number `of`, moved by `shift`; `points` have the colour `rgb`.
     pub fn image<'a>(
         &mut self,
@@ -104,5 +113,56 @@ impl ImageRows {
         let mut columns = self.strips.into_columns()?;
         columns.push(of);
         Ok(columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn domain() -> Domain {
+        Domain::new(10.0, 6.0).unwrap()
+    }
+
+    fn square(x: f64, y: f64) -> [Vec2; 4] {
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| Vec2::new(x + a, y + b))
+    }
+
+    fn polygon(x: f64, y: f64) -> Vec<[f64; 2]> {
+        let mut shifts = Vec::new();
+        shifts_of_polygon(domain(), &square(x, y), |s| shifts.push([s.x, s.y]));
+        shifts
+    }
+
+    #[test]
+    fn a_shape_has_as_many_images_as_it_crosses_edges_and_corners() {
+        assert!(polygon(5.0, 3.0).is_empty());
+        assert!(
+            polygon(9.0, 3.0).is_empty(),
+            "to touch the edge is not to cross it"
+        );
+        assert_eq!(polygon(9.5, 3.0), [[-10.0, 0.0]]);
+        assert_eq!(polygon(5.0, 0.2), [[0.0, 6.0]]);
+        assert_eq!(polygon(0.1, 5.9), [[0.0, -6.0], [10.0, 0.0], [10.0, -6.0]]);
+    }
+
+    #[test]
+    fn a_segment_has_an_image_in_every_box_that_it_passes() {
+        let images = |a: [f64; 2], b: [f64; 2]| {
+            let mut shifts = Vec::new();
+            shifts_of_segment(domain(), &[a.into(), b.into()], |s| shifts.push([s.x, s.y]));
+            shifts
+        };
+        assert!(images([1.0, 1.0], [2.0, 5.0]).is_empty());
+        assert_eq!(images([9.5, 3.0], [10.5, 3.0]), [[-10.0, 0.0]]);
+        // Past the corner, through the box at the right or through the one above.
+        assert_eq!(
+            images([9.5, 5.0], [10.5, 6.1]),
+            [[-10.0, 0.0], [-10.0, -6.0]]
+        );
+        assert_eq!(
+            images([9.0, 5.5], [10.1, 6.5]),
+            [[0.0, -6.0], [-10.0, -6.0]]
+        );
     }
 }

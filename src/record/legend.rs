@@ -2,7 +2,7 @@
 
 use super::Header;
 use super::pictures::{MOST, MOST_PRESSURE, Network, Rgb, half_width, mean, pressure_color};
-use rerun::{AsComponents, Color, LineStrips2D, Points2D, Radius};
+use rerun::{AsComponents, Color, LineStrips2D, Points2D, Radius, SerializedComponentBatch};
 use std::io;
 
 /// Pieces of a colour bar.
@@ -37,10 +37,9 @@ pub(super) fn write(
                     MOST_PRESSURE * (k as f64 + 0.5) / PIECES as f64,
                 ))
             }));
-        put("/world/legend/pressure", &bar)?;
         let marks = [("0", 0.0), ("1", 0.5), ("≥ 2", 1.0)];
         let scale = scale("p / mean", marks, [left, upper, width, height]);
-        put("/world/legend/pressure/scale", &scale)?;
+        put("/world/legend/pressure", &both(&bar, &scale))?;
     }
     if channels.contacts.is_on() {
         let forces = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
@@ -52,12 +51,18 @@ pub(super) fn write(
         let lines = LineStrips2D::new(lines)
             .with_radii(forces.map(|f| half_width(mean_radius, f) as f32))
             .with_colors(forces.map(|f| color(Network::color(f))));
-        put("/world/legend/force", &lines)?;
         let marks = [("0", 0.0), ("1", 1.0 / 3.0), ("2", 2.0 / 3.0), ("≥ 3", 1.0)];
         let scale = scale("f / mean", marks, [left, lower, width, height]);
-        put("/world/legend/force/scale", &scale)?;
+        put("/world/legend/force", &both(&lines, &scale))?;
     }
     Ok(())
+}
+
+/// A bar and its scale, which make one entity.
+fn both(bar: &LineStrips2D, scale: &Points2D) -> Vec<SerializedComponentBatch> {
+    let mut parts = bar.as_serialized_batches();
+    parts.extend(scale.as_serialized_batches());
+    parts
 }
 
 fn color([r, g, b]: Rgb) -> Color {

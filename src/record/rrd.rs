@@ -6,7 +6,7 @@
 //! | `/world`, `/world/box`, `/world/legend` | y up; the periodic box; what colours and widths mean |
 //! | `/world/contours` | particle polygons, coloured by the pressure `p_i = Σ_j f_ij / 2πR_i` on the particle |
 //! | `/world/contours/images` | those that cross an edge, at its other side; `softjam.Image:particle` is the particle |
-//! | `/world/particles` | a point a particle; `softjam.Particle:pressure_contacts_deformation_rattler` has `p_i` (γ/length), the number of contacts with `f > 0`, `max abs ΔR/R`, and 1 for a rattler |
+//! | `/world/particles` | a point a particle; `softjam.Particle:numbers` says `p_i` (γ/length), the number of contacts `Z` with `f > 0`, `max abs ΔR/R`, and whether it rattles |
 //! | `/world/disks` | the undeformed disks of the frame, hidden until asked for |
 //! | `/world/contacts` | a segment a contact between the centres, width and colour by the force; `softjam.Contact:pair`, `:force` (γ), `:overlap` (`δ_ij`, length) |
 //! | `/world/contacts/images` | those that cross an edge, at its other side; `softjam.Image:contact` is the contact |
@@ -197,7 +197,7 @@ impl<W: Write> RrdRecorder<W> {
         contours.end_row(step, nanoseconds);
         images.end_row(step, nanoseconds);
         particles.end_row();
-        self.pending.bytes += 8 * self.contours.vertices() + 40 * radii.len();
+        self.pending.bytes += 8 * self.contours.vertices() + 64 * radii.len();
     }
 
     fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
@@ -234,8 +234,15 @@ impl<W: Write> RrdRecorder<W> {
     /// Writes the batch at hand.
     pub(super) fn flush(&mut self) -> io::Result<()> {
         let pending = core::mem::take(&mut self.pending);
-        self.pending.contours = StripRows::with_room_of(&pending.contours);
-        self.pending.contacts = StripRows::with_room_of(&pending.contacts);
+        self.pending = Pending {
+            contours: StripRows::with_room_of(&pending.contours),
+            contour_images: ImageRows::with_room_of(&pending.contour_images),
+            particles: ParticleRows::with_room_of(&pending.particles),
+            contacts: StripRows::with_room_of(&pending.contacts),
+            contact_images: ImageRows::with_room_of(&pending.contact_images),
+            contact_numbers: ContactRows::with_room_of(&pending.contact_numbers),
+            ..Pending::default()
+        };
         self.write_particles(pending.contours, pending.contour_images, pending.particles)?;
         self.write_contacts(
             pending.contacts,
