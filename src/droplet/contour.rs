@@ -153,32 +153,27 @@ impl Contours {
         first.clear();
         first.push(0);
         self.trace(
-            radii,
-            positions,
-            contacts,
-            line_tension,
+            (radii, positions, contacts, line_tension),
             &mut vertices,
-            |all, _| first.push(all.len()),
+            |all, _, _| first.push(all.len()),
         );
         (self.vertices, self.first) = (vertices, first);
     }
 
     /// Appends the polygons of [`draw`](Self::draw) to `vertices`, in double or in a viewer's single precision; `drawn` is
-    /// called after each of them with all vertices so far and the place of its first.
+    /// called after each of them with all vertices so far, the place of its first, and its deepest dent, the largest
+    /// `R_i − ρ_i` at a contact (length).
     pub(crate) fn trace<V: Vertex>(
         &mut self,
-        radii: &[f64],
-        positions: &[Vec2],
-        contacts: &Contacts<'_>,
-        line_tension: f64,
+        (radii, positions, contacts, line_tension): (&[f64], &[Vec2], &Contacts<'_>, f64),
         vertices: &mut Vec<V>,
-        mut drawn: impl FnMut(&mut Vec<V>, usize),
+        mut drawn: impl FnMut(&mut Vec<V>, usize, f64),
     ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
         self.gather(radii.len(), contacts);
         for (p, (&radius, &centre)) in radii.iter().zip(positions).enumerate() {
             let contacts = &mut self.contacts[self.entry[p]..self.entry[p + 1]];
-            let start = vertices.len();
+            let (start, mut deepest) = (vertices.len(), 0.0);
             if contacts.is_empty() {
                 let point = |d: &Direction| V::at(centre, *d, radius);
                 vertices.extend(self.circle.iter().map(point));
@@ -190,14 +185,14 @@ impl Contours {
                     scale: radius / (2.0 * PI * line_tension),
                 };
                 let tips = self.style.placement == Placement::Contacts;
-                outline.draw(&self.circle, contacts, tips, vertices);
+                deepest = outline.draw(&self.circle, contacts, tips, vertices);
                 self.evaluations += (vertices.len() - start) as u64;
             }
             // Equal angles are counted from 0; with vertices on the contacts any of them may be the first.
             if contacts.is_empty() || self.style.placement == Placement::Equal {
                 vertices[start..].rotate_left(self.below);
             }
-            drawn(vertices, start);
+            drawn(vertices, start, deepest);
         }
     }
 
@@ -326,14 +321,15 @@ struct Outline {
 }
 
 impl Outline {
-    /// Appends the vertices on `circle` and, with `tips`, on the angles of the contacts; both ascend by angle.
+    /// Appends the vertices on `circle` and, with `tips`, on the angles of the contacts; both ascend by angle. Gives the
+    /// deepest dent at a contact (length).
     fn draw<V: Vertex>(
         &self,
         circle: &[Direction],
         contacts: &[(Direction, f64)],
         tips: bool,
         vertices: &mut Vec<V>,
-    ) {
+    ) -> f64 {
         // The sums of the module's text, in units of length: f R_i/2πγ instead of f.
         let (mut s, mut s_c, mut s_s, mut a_c, mut a_s) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (d, f) in contacts {
@@ -353,7 +349,7 @@ impl Outline {
             s_c,
             s_s,
         };
-        let mut drawn = 0;
+        let (mut drawn, mut deepest) = (0, 0.0_f64);
         for (contact, f) in contacts {
             let end = before(circle, contact.angle).max(drawn);
             vertices.extend(
@@ -361,8 +357,10 @@ impl Outline {
                     .iter()
                     .map(move |d| sector.vertex::<V>(d)),
             );
+            let rho = sector.rho(contact);
+            deepest = deepest.max(self.radius - rho);
             if tips {
-                vertices.push(sector.vertex::<V>(contact));
+                vertices.push(V::at(self.centre, *contact, rho));
             }
             drawn = end;
             let turn = 2.0 * PI * self.scale * f;
@@ -370,6 +368,7 @@ impl Outline {
             sector.q += turn * contact.sin;
         }
         vertices.extend(circle[drawn..].iter().map(move |d| sector.vertex::<V>(d)));
+        deepest
     }
 }
 
@@ -390,11 +389,15 @@ struct Sector {
 
 impl Sector {
     #[inline(always)]
-    fn vertex<V: Vertex>(&self, d: &Direction) -> V {
+    fn rho(&self, d: &Direction) -> f64 {
         let along_sin = self.p - d.angle * self.s_c;
         let along_cos = self.q - d.angle * self.s_s;
-        let rho = self.radius + (d.sin * along_sin - d.cos * along_cos);
-        V::at(self.centre, *d, rho)
+        self.radius + (d.sin * along_sin - d.cos * along_cos)
+    }
+
+    #[inline(always)]
+    fn vertex<V: Vertex>(&self, d: &Direction) -> V {
+        V::at(self.centre, *d, self.rho(d))
     }
 }
 

@@ -1,9 +1,10 @@
 //! Rows of line strips, gathered component by component: what a viewer gets most bytes of is copied least.
 
-use super::pictures::{Network, Rgb, particle_colors};
+use super::pictures::{Network, Rgb};
 use crate::contact::Contacts;
 use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
+use crate::frame::Frame;
 use rerun::external::arrow::array::{
     Array, ArrayRef, FixedSizeListArray, Float32Array, ListArray, UInt32Array,
 };
@@ -15,6 +16,15 @@ use std::sync::Arc;
 
 /// A component of a chunk, one list a row.
 pub(super) type Column = (ComponentDescriptor, ListArray);
+
+/// What contours are drawn with and from: radii (length), frame, contacts, line tension γ (force).
+pub(super) type Drawing<'a> = (
+    &'a mut Contours,
+    &'a [f64],
+    &'a Frame,
+    &'a Contacts<'a>,
+    f64,
+);
 
 /// `LineStrips2D` rows in the making.
 #[derive(Default)]
@@ -43,31 +53,38 @@ impl StripRows {
         }
     }
 
-    /// Adds the closed contours of all particles to the row at hand: their number of vertices, the first of each counted
-    /// once.
+    /// Adds a strip to the row at hand.
+    pub fn strip(&mut self, points: impl IntoIterator<Item = [f32; 2]>, color: Rgb) {
+        self.points.extend(points);
+        self.strips.push(self.points.len());
+        self.colors.push(rgba(color));
+    }
+
+    /// Half the width of the strip added last (length); either all strips of an entity have one or none.
+    pub fn half_width(&mut self, half_width: f64) {
+        self.radii.push(half_width as f32);
+    }
+
+    /// Adds the closed contours of all particles to the row at hand: their number of vertices. `each` is told particle,
+    /// contour and deepest dent (length), and says the colour.
     pub fn contours(
         &mut self,
-        contours: &mut Contours,
-        radii: &[f64],
-        positions: &[Vec2],
-        contacts: &Contacts<'_>,
-        line_tension: f64,
+        (contours, radii, frame, contacts, line_tension): Drawing<'_>,
+        mut each: impl FnMut(usize, &[[f32; 2]], f64) -> Rgb,
     ) -> usize {
-        let (before, strips) = (self.points.len(), &mut self.strips);
+        let (before, mut p) = (self.points.len(), 0);
+        let (strips, colors) = (&mut self.strips, &mut self.colors);
         contours.trace(
-            radii,
-            positions,
-            contacts,
-            line_tension,
+            (radii, &frame.positions, contacts, line_tension),
             &mut self.points,
-            |points, first| {
+            |points, first, deepest| {
                 points.push(points[first]);
                 strips.push(points.len());
+                colors.push(rgba(each(p, &points[first..], deepest)));
+                p += 1;
             },
         );
-        let colors = particle_colors(radii, contacts);
-        self.colors.extend(colors.into_iter().map(rgba));
-        self.points.len() - before - radii.len()
+        self.points.len() - before
     }
 
     /// Adds the segments of a network to the row at hand.

@@ -18,8 +18,13 @@
 //! ```
 
 mod blueprint;
+mod cells;
 mod columns;
 mod encode;
+mod header;
+mod hover;
+mod images;
+mod legend;
 mod live;
 mod mcap;
 pub(crate) mod messages;
