@@ -48,6 +48,12 @@ pub struct Converted {
 }
 
 /// Why a recording cannot be converted.
+///
+/// ```
+/// use softjam::convert::ConvertError;
+/// let error = ConvertError::NoState { path: "run.rrd".to_owned() };
+/// assert!(error.to_string().contains("only its metrics can be converted"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConvertError {

@@ -79,6 +79,8 @@ pub const METRICS: [&str; 9] = [
 ];
 
 /// The values of [`METRICS`].
+///
+/// See the example of [`Observables::metrics`].
 pub type Metrics = [f64; METRICS.len()];
 
 /// Net forces of the contacts on each particle, `F_i = Σ_j f_ij n_ij` (force), summed in the order of the contact list.

@@ -181,19 +181,23 @@ pub(crate) fn nanoseconds(time: f64) -> i64 {
 /// Turns snapshots into a file of one format.
 ///
 /// ```
-/// use softjam::{record::{Header, McapRecorder, Recorder, RrdRecorder}, relax::Relaxation, scene::Scene};
+/// use softjam::record::{Header, McapRecorder, Recorder, RrdRecorder, Snapshot};
+/// use softjam::{relax::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let run = Relaxation::new(&scene).unwrap();
 /// let header = Header::of(&scene, &run);
+/// let snapshot = Snapshot::of(&run, &scene.channels, true).unwrap();
 /// let (mut rrd, mut mcap) = (Vec::new(), Vec::new());
 /// let recorders: [Box<dyn Recorder + '_>; 2] = [
 ///     Box::new(RrdRecorder::new(&mut rrd, header.clone()).unwrap()),
 ///     Box::new(McapRecorder::new(&mut mcap, header).unwrap()),
 /// ];
 /// for mut recorder in recorders {
+///     recorder.record(&snapshot).unwrap();
 ///     let written = recorder.finish(None).unwrap();
-///     assert_eq!((written.states, written.bytes), (0, recorder.written()));
+///     assert_eq!((written.states, written.bytes), (1, recorder.written()));
+///     assert_eq!(recorder.intact(), Some(0), "step 0 is in the file");
 /// }
 /// ```
 pub trait Recorder {
@@ -202,12 +206,18 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step that it holds in full.
+    ///
+    /// See the example of [`Recorder`].
     fn record(&mut self, snapshot: &Snapshot) -> io::Result<()>;
 
     /// The last step that the sink holds in full.
+    ///
+    /// See the example of [`Recorder`].
     fn intact(&self) -> Option<u64>;
 
     /// Bytes that the sink holds and that make sense on their own: what comes behind them is a torn end.
+    ///
+    /// See the example of [`Recorder`].
     fn written(&self) -> u64;
 
     /// Writes what is left and the outcome and closes the file. Without an outcome the recording is one of an
@@ -216,6 +226,8 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with.
+    ///
+    /// See the example of [`Recorder`].
     fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written>;
 }
 
@@ -275,17 +287,23 @@ pub struct Summary {
 }
 
 /// Why a recording could not be made.
+///
+/// ```
+/// use softjam::record::RecordError;
+/// let error = RecordError::Exists { path: "run.rrd".to_owned() };
+/// assert!(error.to_string().contains("--force"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
     /// The file exists and is not to be replaced.
-    #[error("{path} exists; say --force to replace it, or name another file with -o")]
+    #[error("{path} exists; say --force to replace it, or name another file")]
     Exists {
         /// Path of the file.
         path: String,
     },
     /// The file is one that the run reads from.
-    #[error("{path} is an input of this run; name another file with -o")]
+    #[error("{path} is what is read from; name another file to write")]
     Input {
         /// Path of the file.
         path: String,
