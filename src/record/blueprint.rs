@@ -1,17 +1,17 @@
-//! The layout that a recording opens with: the packing at the left, the fall of `f_max` and the metrics at the right.
+//! The layout that a recording opens with: the packing at the left; the fall of `f_max`, the metrics and the scene at the
+//! right. It is the same for all recordings.
 
 use super::encode::Encoder;
-use crate::domain::Domain;
 use rerun::datatypes::{TimeRange, TimeRangeBoundary};
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, PanelBlueprint, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents,
-    ViewportBlueprint, VisualBounds2D,
+    ContainerBlueprint, EntityBehavior, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint,
+    ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     ContainerKind, LinkAxis, PanelState, PlayState, RootContainer,
 };
-use rerun::{AsComponents, TimePoint, Timeline};
+use rerun::{AsComponents, Color, SeriesLines, TimePoint, Timeline};
 use std::io::{self, Write};
 
 /// A view: its number, its kind, its title, and the entities it shows.
@@ -21,37 +21,52 @@ struct View {
     title: &'static str,
     origin: &'static str,
     contents: &'static [&'static str],
+    /// The colour of its curve, if it plots one.
+    curve: [u8; 3],
 }
 
 const PACKING: View = View {
     number: 1,
     class: "2D",
-    title: "Packing: contours and force chains",
+    title: "Packing: pressure on the particles, force chains",
     origin: "/",
     contents: &["+ /world/**"],
+    curve: [0; 3],
 };
 
-const PLOTS: [View; 3] = [
+/// The plot above, and those that stand side by side below it.
+const PLOTS: [View; 4] = [
     View {
         number: 2,
         class: "TimeSeries",
-        title: "log₁₀ f_max / γ",
+        title: "log₁₀ of f_max / γ, over steps",
         origin: "/metrics",
         contents: &["+ /metrics/log10_f_max"],
-    },
-    View {
-        number: 3,
-        class: "TimeSeries",
-        title: "Pressure and energy",
-        origin: "/metrics",
-        contents: &["+ /metrics/pressure", "+ /metrics/energy"],
+        curve: [255, 170, 60],
     },
     View {
         number: 4,
         class: "TimeSeries",
-        title: "Coordination number Z",
+        title: "Z",
         origin: "/metrics",
         contents: &["+ /metrics/coordination"],
+        curve: [100, 190, 255],
+    },
+    View {
+        number: 3,
+        class: "TimeSeries",
+        title: "Pressure (γ/length)",
+        origin: "/metrics",
+        contents: &["+ /metrics/pressure"],
+        curve: [80, 220, 120],
+    },
+    View {
+        number: 6,
+        class: "TimeSeries",
+        title: "Energy (γ·length)",
+        origin: "/metrics",
+        contents: &["+ /metrics/energy"],
+        curve: [250, 220, 80],
     },
 ];
 
@@ -61,6 +76,7 @@ const SCENE: View = View {
     title: "Scene",
     origin: "/scene",
     contents: &["+ /scene"],
+    curve: [0; 3],
 };
 
 impl View {
@@ -77,11 +93,7 @@ fn uuid(number: u8) -> rerun::external::uuid::Uuid {
 }
 
 /// Writes the blueprint of the recording `recording` and makes it the one shown.
-pub(super) fn write<W: Write>(
-    encoder: &mut Encoder<W>,
-    recording: &str,
-    domain: Domain,
-) -> io::Result<()> {
+pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::Result<()> {
     let store = StoreId::new(
         StoreKind::Blueprint,
         env!("CARGO_PKG_NAME"),
@@ -116,37 +128,52 @@ pub(super) fn write<W: Write>(
                 .with_link(LinkAxis::Independent)
                 .with_view_range(everything),
         )?;
+        let [r, g, b] = plot.curve;
+        let curve = SeriesLines::new()
+            .with_colors([Color::from_rgb(r, g, b)])
+            .with_widths([2.0]);
+        log(&format!("{}/defaults", plot.path()), &curve)?;
+        // One curve a plot, whose title names it.
+        log(
+            &format!("{}/PlotLegend", plot.path()),
+            &PlotLegend::new().with_visible(false),
+        )?;
     }
-    // In the view y points down; the packing is mirrored into y < 0.
-    let l = domain.lengths();
-    let margin = 0.03 * l.norm();
+    // No bounds are said: the view fits what there is. A blueprint holds for all recordings that are open, whatever the
+    // sizes of their boxes.
+    let of = |entity: &str| {
+        format!(
+            "{}/ViewContents/overrides/{entity}/visualizers",
+            PACKING.path()
+        )
+    };
     log(
-        &format!("{}/VisualBounds2D", PACKING.path()),
-        &VisualBounds2D::new(rerun::datatypes::Range2D {
-            x_range: [-margin, l.x + margin].into(),
-            y_range: [-l.y - margin, margin].into(),
-        }),
+        &of("world/disks"),
+        &EntityBehavior::new().with_visible(false),
     )?;
+    for still in ["world/box", "world/legend"] {
+        log(&of(still), &EntityBehavior::new().with_interactive(false))?;
+    }
     let container = |number: u8| format!("container/{}", uuid(number));
-    let (plots, side, root) = (container(10), container(11), container(12));
-    let paths: Vec<String> = PLOTS.iter().map(View::path).collect();
+    let (row, side, root) = (container(10), container(11), container(12));
+    let [fall, rest @ ..] = &PLOTS;
     log(
-        &plots,
-        &ContainerBlueprint::new(ContainerKind::Vertical)
-            .with_display_name("Relaxation")
-            .with_contents(paths),
+        &row,
+        &ContainerBlueprint::new(ContainerKind::Horizontal)
+            .with_contents(rest.iter().map(View::path)),
     )?;
     log(
         &side,
-        &ContainerBlueprint::new(ContainerKind::Tabs)
-            .with_contents([plots.clone(), SCENE.path()])
-            .with_active_tab(plots.as_str()),
+        &ContainerBlueprint::new(ContainerKind::Vertical)
+            .with_display_name("Relaxation")
+            .with_contents([fall.path(), row.clone(), SCENE.path()])
+            .with_row_shares([5.0, 3.5, 5.0]),
     )?;
     log(
         &root,
         &ContainerBlueprint::new(ContainerKind::Horizontal)
             .with_contents([PACKING.path(), side.clone()])
-            .with_col_shares([2.0, 1.0]),
+            .with_col_shares([6.0, 5.0]),
     )?;
     log(
         "viewport",

@@ -19,7 +19,7 @@ use super::messages::{
     ABOUT, DESCRIPTORS, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS,
     StateMessage, topic,
 };
-use super::pictures::{Network, particle_colors};
+use super::pictures::{Network, Particles};
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
 use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written};
@@ -167,7 +167,7 @@ impl<W: Write> McapRecorder<W> {
                 let radii = self.packing.radii();
                 self.contours
                     .draw(radii, &frame.positions, &contacts, self.line_tension);
-                let colors = particle_colors(radii, &contacts);
+                let colors = Particles::of(radii, &contacts).colors();
                 let lines = contour_lines(step, &self.contours, &colors);
                 let cloud = vertex_cloud(step, &self.contours, &colors);
                 self.send(self.topics.contours, step, &lines)?;

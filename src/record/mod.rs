@@ -18,8 +18,13 @@
 //! ```
 
 mod blueprint;
+mod cells;
 mod columns;
 mod encode;
+mod header;
+mod hover;
+mod images;
+mod legend;
 mod live;
 mod mcap;
 pub(crate) mod messages;
@@ -27,6 +32,7 @@ mod pictures;
 mod rrd;
 mod scene_update;
 mod sink;
+mod states;
 mod writer;
 
 pub use live::{Ended, Live, LiveError, Shown, Viewer};
@@ -34,7 +40,7 @@ pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
 pub use writer::{Writer, Written};
 
-use crate::force::Metrics;
+use crate::force::{Backbone, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Status};
@@ -142,13 +148,23 @@ impl Snapshot {
     /// See the example of [`Snapshot`].
     #[must_use]
     pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
+        Self::counted(run, channels, edge, &mut Backbone::default())
+    }
+
+    /// [`of`](Self::of) with a counter of rattlers that remembers the snapshot before.
+    pub(crate) fn counted(
+        run: &Relaxation,
+        channels: &Channels,
+        edge: bool,
+        backbone: &mut Backbone,
+    ) -> Option<Self> {
         let step = run.step();
         let [contours, contacts, metrics, state] = channels.at(step, edge);
         let frame = contours || contacts || state;
         (frame || metrics).then(|| Self {
             step,
             nanoseconds: nanoseconds(run.time()),
-            metrics: metrics.then(|| run.observables().metrics()),
+            metrics: metrics.then(|| run.observables_counted(backbone).metrics()),
             frame: frame.then(|| run.frame()),
             contours,
             contacts,
@@ -368,11 +384,13 @@ pub fn record_live(
     mut watch: impl FnMut(&Relaxation) -> bool,
 ) -> Result<Summary, RecordError> {
     let first = run.step();
+    let mut backbone = Backbone::default();
     loop {
         let status = run.status();
         let goes_on = watch(run);
         let last = status != Status::Running || !goes_on;
-        if let Some(snapshot) = Snapshot::of(run, channels, last || run.step() == first) {
+        let edge = last || run.step() == first;
+        if let Some(snapshot) = Snapshot::counted(run, channels, edge, &mut backbone) {
             let snapshot = Arc::new(snapshot);
             for writer in &mut writers {
                 writer.send(Arc::clone(&snapshot))?;

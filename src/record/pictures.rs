@@ -2,31 +2,76 @@
 
 use crate::contact::Contacts;
 use crate::domain::Vec2;
+use crate::force::held;
 use core::f64::consts::PI;
 use std::sync::LazyLock;
 
 /// Red, green, blue.
 pub(super) type Rgb = [u8; 3];
 
-/// A colour a particle: the pressure `Σ_j f_ij / 2πR_i` on it, relative to the mean over the frame; gray where there is none.
-pub(super) fn particle_colors(radii: &[f64], contacts: &Contacts<'_>) -> Vec<Rgb> {
-    let mut pressure = vec![0.0; radii.len()];
-    for (&[i, j], f) in contacts.pairs.iter().zip(contacts.forces) {
-        pressure[i as usize] += f;
-        pressure[j as usize] += f;
-    }
-    for (p, r) in pressure.iter_mut().zip(radii) {
-        *p /= 2.0 * PI * r;
-    }
-    let mean = pressure.iter().sum::<f64>() / radii.len() as f64;
-    let color = |&p: &f64| {
-        if p > 0.0 {
-            VIRIDIS.at(0.3 + 0.7 * (p / mean / 2.0).min(1.0))
-        } else {
-            [120, 120, 120]
+/// What is seen of each particle beside its contour.
+pub(super) struct Particles {
+    /// The pressure `p_i = Σ_j f_ij / 2πR_i` on it (force/length).
+    pub pressure: Vec<f64>,
+    /// Number of contacts with `f > 0`.
+    pub contacts: Vec<u32>,
+    /// Whether it is held by its contacts, that is, no rattler.
+    pub held: Vec<bool>,
+    /// Mean pressure over the particles that have a contact with `f > 0` (force/length).
+    mean: f64,
+}
+
+impl Particles {
+    /// The particles of `radii` with `contacts`.
+    pub fn of(radii: &[f64], contacts: &Contacts<'_>) -> Self {
+        let number = radii.len();
+        let (mut pressure, mut counts) = (vec![0.0; number], vec![0; number]);
+        let mut touching = Vec::with_capacity(contacts.pairs.len());
+        for (&[i, j], &f) in contacts.pairs.iter().zip(contacts.forces) {
+            for p in [i as usize, j as usize] {
+                pressure[p] += f;
+                counts[p] += u32::from(f > 0.0);
+            }
+            if f > 0.0 {
+                touching.push([i, j]);
+            }
         }
-    };
-    pressure.iter().map(color).collect()
+        for (p, r) in pressure.iter_mut().zip(radii) {
+            *p /= 2.0 * PI * r;
+        }
+        let pressed = counts.iter().filter(|n| **n > 0).count().max(1);
+        Self {
+            mean: pressure.iter().sum::<f64>() / pressed as f64,
+            held: held(number, &touching),
+            contacts: counts,
+            pressure,
+        }
+    }
+
+    /// The colour of particle `p`: its pressure relative to the mean; gray if it rattles.
+    pub fn color(&self, p: usize) -> Rgb {
+        if self.held[p] && self.mean > 0.0 {
+            pressure_color(self.pressure[p] / self.mean)
+        } else {
+            RATTLER
+        }
+    }
+
+    /// The colours of all particles.
+    pub fn colors(&self) -> Vec<Rgb> {
+        (0..self.held.len()).map(|p| self.color(p)).collect()
+    }
+}
+
+/// The largest pressure that colours tell apart, in means.
+pub(super) const MOST_PRESSURE: f64 = 2.0;
+
+/// The colour of rattlers, which is not on the colour maps.
+pub(super) const RATTLER: Rgb = [170, 170, 170];
+
+/// The colour of a pressure in means: viridis without its darkest quarter, which a black ground swallows.
+pub(super) fn pressure_color(relative: f64) -> Rgb {
+    VIRIDIS.at(0.25 + 0.75 * (relative / MOST_PRESSURE).clamp(0.0, 1.0))
 }
 
 /// The largest force that widths and colours tell apart, in means.
@@ -46,10 +91,10 @@ impl Network {
     /// The network of `contacts` between particles at `positions`.
     pub fn of(positions: &[Vec2], radii: &[f64], contacts: &Contacts<'_>) -> Self {
         let number = contacts.forces.len().max(1) as f64;
-        let mean = contacts.forces.iter().sum::<f64>() / number;
+        let average = contacts.forces.iter().sum::<f64>() / number;
         let relative = |f: &f64| {
-            if mean > 0.0 {
-                (f / mean).clamp(0.0, MOST)
+            if average > 0.0 {
+                (f / average).clamp(0.0, MOST)
             } else {
                 0.0
             }
@@ -61,19 +106,29 @@ impl Network {
         Self {
             segments: contacts.pairs.iter().enumerate().map(segment).collect(),
             relative: contacts.forces.iter().map(relative).collect(),
-            mean_radius: radii.iter().sum::<f64>() / radii.len() as f64,
+            mean_radius: mean(radii),
         }
     }
 
     /// Half the width of the line of a contact with the relative force `r` (length).
     pub fn half_width(&self, r: f64) -> f64 {
-        0.05 * self.mean_radius * (0.2 + r)
+        half_width(self.mean_radius, r)
     }
 
     /// The colour of a contact with the relative force `r`.
     pub fn color(r: f64) -> Rgb {
         INFERNO.at(0.45 + 0.5 * r / MOST)
     }
+}
+
+/// Mean of numbers of which there is at least one.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Half the width of the line of a contact with the relative force `r`, among particles of `mean_radius` (length).
+pub(super) fn half_width(mean_radius: f64, r: f64) -> f64 {
+    0.05 * mean_radius * (0.2 + r)
 }
 
 /// A colour map in 256 steps: evaluating its spline for every particle and contact of a frame would cost more than

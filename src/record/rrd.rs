@@ -3,47 +3,46 @@
 //! | entity | content |
 //! | --- | --- |
 //! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program`, `:from_step` |
-//! | `/world`, `/world/box` | y up; the periodic box |
-//! | `/world/contours` | particle polygons, coloured by the pressure on the particle |
-//! | `/world/contacts` | a segment a contact between the centres, width and colour by the force |
+//! | `/world`, `/world/box`, `/world/legend` | y up; the periodic box; what colours and widths mean |
+//! | `/world/contours` | particle polygons, coloured by the pressure `p_i = Σ_j f_ij / 2πR_i` on the particle |
+//! | `/world/contours/images` | those that cross an edge, at its other side; `softjam.Image:particle` is the particle |
+//! | `/world/particles` | a point a particle; `softjam.Particle:numbers` says `p_i` (γ/length), the number of contacts `Z` with `f > 0`, `max abs ΔR/R`, and whether it rattles |
+//! | `/world/disks` | the undeformed disks of the frame, hidden until asked for |
+//! | `/world/contacts` | a segment a contact between the centres, width and colour by the force; `softjam.Contact:pair`, `:force` (γ), `:overlap` (`δ_ij`, length) |
+//! | `/world/contacts/images` | those that cross an edge, at its other side; `softjam.Image:contact` is the contact |
 //! | `/metrics/*` | one scalar each |
 //! | `/particles` | `softjam.Particles:radius`, `:box` (the sides) |
 //! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless |
 //! | `/result` | `softjam.Result:converged`, `:steps`, `:f_max`, `:digest`; its absence means an unfinished run |
 //!
-//! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
+//! Images, points and disks belong to the channel of the contours or contacts that they stand beside, which are instance by
+//! instance the particles and the contacts of the state.
+//!
+//! Rows are gathered into chunks of about two megabytes, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
-use super::columns::{Column, StripRows, lists};
+use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
-use super::pictures::{Network, particle_colors};
-use super::{
-    FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written, blueprint, recording_id,
-};
-use crate::contact::FrameContacts;
-use crate::domain::Vec2;
+use super::hover::{ContactRows, ParticleRows};
+use super::images::{ImageRows, shifts_of_polygon, shifts_of_segment};
+use super::pictures::{Network, Particles};
+use super::states::StateRows;
+use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
+use crate::contact::{Contacts, FrameContacts};
 use crate::droplet::contour::Contours;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
-use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, StringArray, UInt8Array, UInt32Array,
-    UInt64Array,
-};
+use rerun::external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt64Array};
 use rerun::external::arrow::buffer::OffsetBuffer;
-use rerun::external::arrow::datatypes::{DataType, Field};
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
-use rerun::{
-    AsComponents, Color, DynamicArchetype, LineStrips2D, Radius, Scalars, TextDocument, TimeColumn,
-    TimePoint, Timeline, Transform3D,
-};
+use rerun::{DynamicArchetype, Scalars, TimeColumn, TimePoint};
 use std::io::{self, Write};
-use std::sync::Arc;
 
 /// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
 /// is killed loses no more than a batch.
-const BATCH_BYTES: usize = 1 << 20;
+const BATCH_BYTES: usize = 1 << 21;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 
@@ -90,8 +89,12 @@ pub struct RrdRecorder<W> {
 struct Pending {
     metrics: Vec<MetricRow>,
     contours: StripRows,
+    contour_images: ImageRows,
+    particles: ParticleRows,
     contacts: StripRows,
-    states: Vec<Row<DynamicArchetype>>,
+    contact_images: ImageRows,
+    contact_numbers: ContactRows,
+    states: StateRows,
     bytes: usize,
     snapshots: usize,
     first: Option<u64>,
@@ -100,11 +103,6 @@ struct Pending {
 
 /// A step, its simulated time in nanoseconds and its metrics.
 type MetricRow = (u64, i64, Metrics);
-
-struct Row<T> {
-    time: TimePoint,
-    data: T,
-}
 
 impl<W: Write> RrdRecorder<W> {
     /// Starts a recording: blueprint, scene, box, radii.
@@ -125,10 +123,10 @@ impl<W: Write> RrdRecorder<W> {
     }
 
     fn start(mut encoder: Encoder<W>, header: Header, recording: &str) -> io::Result<Self> {
-        blueprint::write(&mut encoder, recording, header.packing.domain())?;
+        blueprint::write(&mut encoder, recording)?;
         let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
         encoder.open(&store)?;
-        write_header(&mut encoder, &store, &header)?;
+        header::write(&mut encoder, &store, &header)?;
         Ok(Self {
             encoder,
             store,
@@ -145,41 +143,79 @@ impl<W: Write> RrdRecorder<W> {
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
         if snapshot.contours || snapshot.contacts {
             let contacts = FrameContacts::of(&self.packing, frame);
-            let contacts = contacts.view();
-            let radii = self.packing.radii();
             if snapshot.contours {
-                self.contours
-                    .draw(radii, &frame.positions, &contacts, self.line_tension);
-                let rows = &mut self.pending.contours;
-                for (p, color) in particle_colors(radii, &contacts).into_iter().enumerate() {
-                    let polygon = self.contours.polygon(p);
-                    rows.strip(polygon.iter().chain(polygon.first()), color);
-                }
-                rows.end_row(snapshot.step, snapshot.nanoseconds);
-                self.pending.bytes += 8 * self.contours.vertices();
+                self.draw_particles(snapshot, frame, &contacts.view());
             }
             if snapshot.contacts {
-                let network = Network::of(&frame.positions, radii, &contacts);
-                let rows = &mut self.pending.contacts;
-                for (segment, &relative) in network.segments.iter().zip(&network.relative) {
-                    rows.strip(segment, Network::color(relative));
-                    rows.half_width(network.half_width(relative));
-                }
-                rows.end_row(snapshot.step, snapshot.nanoseconds);
-                self.pending.bytes += 24 * contacts.pairs.len();
+                self.draw_contacts(snapshot, frame, &contacts.view());
             }
         }
         if snapshot.state {
             let digest = frame.digest();
             self.digests.update(&digest);
             self.states += 1;
-            let time = TimePoint::default()
-                .with(Timeline::new_sequence("step"), snapshot.step as i64)
-                .with(Timeline::new_duration("sim_time"), snapshot.nanoseconds);
-            let data = state(frame, &digest);
-            self.pending.states.push(Row { time, data });
+            self.pending
+                .states
+                .row(snapshot.nanoseconds, frame, &digest);
             self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
         }
+    }
+
+    fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let (domain, radii) = (self.packing.domain(), self.packing.radii());
+        let seen = Particles::of(radii, contacts);
+        let Pending {
+            contours,
+            contour_images: images,
+            particles,
+            ..
+        } = &mut self.pending;
+        let line_tension = self.line_tension;
+        let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
+        let vertices = contours.contours(drawing, |p, polygon, deepest| {
+            let color = seen.color(p);
+            shifts_of_polygon(domain, polygon, |shift| {
+                images.image(polygon, shift, color, p);
+            });
+            particles.particle(
+                &seen,
+                frame.positions[p],
+                deepest / radii[p],
+                line_tension,
+                p,
+            );
+            color
+        });
+        contours.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        particles.end_row();
+        self.pending.bytes += 8 * vertices + 64 * radii.len();
+    }
+
+    fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let network = Network::of(&frame.positions, self.packing.radii(), contacts);
+        let domain = self.packing.domain();
+        let Pending {
+            contacts: rows,
+            contact_images: images,
+            contact_numbers: numbers,
+            ..
+        } = &mut self.pending;
+        rows.network(&network);
+        for (c, (segment, &relative)) in network.segments.iter().zip(&network.relative).enumerate()
+        {
+            shifts_of_segment(domain, segment, |shift| {
+                let single = segment.map(|v| [v.x as f32, v.y as f32]);
+                images.image(&single, shift, Network::color(relative), c);
+                images.strips.half_width(network.half_width(relative));
+            });
+        }
+        rows.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        numbers.row(contacts, self.line_tension);
+        self.pending.bytes += 40 * contacts.pairs.len();
     }
 
     /// Whether no batch is at hand.
@@ -189,42 +225,57 @@ impl<W: Write> RrdRecorder<W> {
 
     /// Writes the batch at hand.
     pub(super) fn flush(&mut self) -> io::Result<()> {
-        let Pending {
-            metrics,
-            contours,
-            contacts,
-            states,
-            last,
-            ..
-        } = core::mem::take(&mut self.pending);
-        self.pending.contours = StripRows::with_room_of(&contours);
-        self.pending.contacts = StripRows::with_room_of(&contacts);
-        self.write_strips("/world/contours", contours)?;
-        self.write_strips("/world/contacts", contacts)?;
-        self.write_metrics(&metrics)?;
-        self.write_rows("/state", states)?;
-        self.intact = last.or(self.intact);
+        let pending = core::mem::take(&mut self.pending);
+        self.pending = Pending {
+            contours: StripRows::with_room_of(&pending.contours),
+            contour_images: ImageRows::with_room_of(&pending.contour_images),
+            particles: ParticleRows::with_room_of(&pending.particles),
+            contacts: StripRows::with_room_of(&pending.contacts),
+            contact_images: ImageRows::with_room_of(&pending.contact_images),
+            contact_numbers: ContactRows::with_room_of(&pending.contact_numbers),
+            states: StateRows::with_room_of(&pending.states),
+            ..Pending::default()
+        };
+        self.write_particles(pending.contours, pending.contour_images, pending.particles)?;
+        self.write_contacts(
+            pending.contacts,
+            pending.contact_images,
+            pending.contact_numbers,
+        )?;
+        self.write_metrics(&pending.metrics)?;
+        let times = pending.states.times.clone();
+        self.write_columns("/state", &times, pending.states.into_columns()?)?;
+        self.intact = pending.last.or(self.intact);
         Ok(())
     }
 
-    fn write_rows<T: AsComponents>(&mut self, entity: &str, rows: Vec<Row<T>>) -> io::Result<()> {
-        if rows.is_empty() {
-            return Ok(());
-        }
-        let mut builder = Chunk::builder_with_id(self.encoder.chunk_id(), entity);
-        for row in rows {
-            builder = builder.with_archetype(self.encoder.row_id(), row.time, &row.data);
-        }
-        self.encoder
-            .append(&self.store, &builder.build().map_err(io::Error::other)?)
+    fn write_particles(
+        &mut self,
+        contours: StripRows,
+        images: ImageRows,
+        particles: ParticleRows,
+    ) -> io::Result<()> {
+        let times = contours.times.clone();
+        let (points, disks) = particles.into_columns()?;
+        self.write_columns("/world/contours", &times, contours.into_columns()?)?;
+        let images = images.into_columns("softjam.Image:particle")?;
+        self.write_columns("/world/contours/images", &times, images)?;
+        self.write_columns("/world/particles", &times, points)?;
+        self.write_columns("/world/disks", &times, disks)
     }
 
-    fn write_strips(&mut self, entity: &str, rows: StripRows) -> io::Result<()> {
-        if rows.times.is_empty() {
-            return Ok(());
-        }
-        let times = rows.times.clone();
-        self.write_columns(entity, &times, rows.into_columns()?)
+    fn write_contacts(
+        &mut self,
+        contacts: StripRows,
+        images: ImageRows,
+        numbers: ContactRows,
+    ) -> io::Result<()> {
+        let times = contacts.times.clone();
+        let mut columns = contacts.into_columns()?;
+        columns.extend(numbers.into_columns()?);
+        self.write_columns("/world/contacts", &times, columns)?;
+        let images = images.into_columns("softjam.Image:contact")?;
+        self.write_columns("/world/contacts/images", &times, images)
     }
 
     fn write_metrics(&mut self, rows: &[MetricRow]) -> io::Result<()> {
@@ -249,6 +300,9 @@ impl<W: Write> RrdRecorder<W> {
         times: &[(u64, i64)],
         columns: Vec<Column>,
     ) -> io::Result<()> {
+        if times.is_empty() {
+            return Ok(());
+        }
         let timelines = [
             TimeColumn::new_sequence("step", times.iter().map(|t| t.0 as i64)),
             TimeColumn::new_duration_nanos("sim_time", times.iter().map(|t| t.1)),
@@ -326,96 +380,4 @@ impl<W: Write> Recorder for RrdRecorder<W> {
             states: self.states,
         })
     }
-}
-
-fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
-    Arc::new(array)
-}
-
-/// Scene, axes, box and radii: what does not change.
-fn write_header<W: Write>(
-    encoder: &mut Encoder<W>,
-    store: &StoreId,
-    header: &Header,
-) -> io::Result<()> {
-    let packing = &header.packing;
-    let toml = header.scene.to_toml();
-    let l = packing.domain().lengths();
-    let text = format!(
-        "# Deformable particles\n\n\
-         Morse–Witten model, recorded by {PROGRAM}.\n\n\
-         | | |\n| --- | --- |\n\
-         | particles | {} |\n| coverage φ | {:.6} |\n| box | {:.6} × {:.6} |\n| line tension γ | {} |\n| threshold on f_max | {:e} γ |\n\n\
-         ```toml\n{toml}```\n",
-        packing.len(),
-        packing.coverage(),
-        l.x,
-        l.y,
-        header.scene.line_tension,
-        header.scene.threshold,
-    );
-    let document = TextDocument::from_markdown(text);
-    let scene = DynamicArchetype::new("softjam.Scene")
-        .with_component_from_data("toml", array(StringArray::from(vec![toml])))
-        .with_component_from_data(
-            "format_version",
-            array(UInt32Array::from(vec![FORMAT_VERSION])),
-        )
-        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])))
-        .with_component_from_data(
-            "from_step",
-            array(UInt64Array::from(vec![header.from_step])),
-        );
-    let particles = DynamicArchetype::new("softjam.Particles")
-        .with_component_from_data(
-            "radius",
-            array(Float64Array::from(packing.radii().to_vec())),
-        )
-        .with_component_from_data("box", array(Float64Array::from(vec![l.x, l.y])));
-    // Rerun's 2D views have y down, a packing has it up.
-    let up = Transform3D::from_mat3x3([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
-    let (x, y) = (l.x as f32, l.y as f32);
-    let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
-    let frame = LineStrips2D::new([corners])
-        .with_colors([Color::from_rgb(140, 140, 140)])
-        .with_radii([Radius::new_ui_points(1.0)]);
-    let outline = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.1)]);
-    let graph = LineStrips2D::update_fields().with_draw_order(31.0);
-    let everywhere: [(&str, &dyn AsComponents); 7] = [
-        ("/scene", &document),
-        ("/scene", &scene),
-        ("/particles", &particles),
-        ("/world", &up),
-        ("/world/box", &frame),
-        ("/world/contours", &outline),
-        ("/world/contacts", &graph),
-    ];
-    for (entity, data) in everywhere {
-        encoder.single(store, entity, TimePoint::default(), data)?;
-    }
-    Ok(())
-}
-
-/// The lossless state.
-fn state(frame: &Frame, digest: &[u8; 32]) -> DynamicArchetype {
-    let pairs_of = |v: &[Vec2]| {
-        let flat = Float64Array::from_iter_values(v.iter().flat_map(|p| [p.x, p.y]));
-        pairs(DataType::Float64, array(flat))
-    };
-    let contacts = UInt32Array::from_iter_values(frame.contacts.iter().flatten().copied());
-    DynamicArchetype::new("softjam.State")
-        .with_component_from_data("position", pairs_of(&frame.positions))
-        .with_component_from_data("velocity", pairs_of(&frame.velocities))
-        .with_component_from_data("contact", pairs(DataType::UInt32, array(contacts)))
-        .with_component_from_data("force", array(Float64Array::from(frame.forces.clone())))
-        .with_component_from_data(
-            "minimizer",
-            array(Float64Array::from(frame.minimizer.values())),
-        )
-        .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())))
-}
-
-fn pairs(of: DataType, flat: ArrayRef) -> ArrayRef {
-    let item = Arc::new(Field::new("item", of, false));
-    array(FixedSizeListArray::new(item, 2, flat, None))
 }

@@ -6,7 +6,7 @@
 
 use super::difference::{self, Difference, What};
 use super::{Metrics, ReadError, Recording, State};
-use crate::force::{METRICS, Observables};
+use crate::force::{Backbone, METRICS, Observables};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation};
@@ -249,9 +249,10 @@ fn first_run(
 
 /// Advances `run` to the segment's end; the first difference on the way.
 fn walk(run: &mut Relaxation, segment: &Segment) -> Result<Option<Difference>, RelaxError> {
+    let mut backbone = Backbone::default();
     loop {
         if let Some(metrics) = segment.metrics.get(&run.step())
-            && let Some(what) = metrics_differ(&run.observables(), metrics)
+            && let Some(what) = metrics_differ(&run.observables_counted(&mut backbone), metrics)
         {
             let step = run.step();
             return Ok(Some(Difference { step, what }));

@@ -29,3 +29,5 @@ mod recording;
 #[cfg(feature = "recording")]
 mod replay;
 mod scenes;
+#[cfg(feature = "recording")]
+mod viewer;

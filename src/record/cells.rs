@@ -1,0 +1,242 @@
+//! Rows of values, one cell of `W` numbers for each instance of an entity.
+
+use super::columns::{Column, lists, offsets};
+use rerun::ComponentDescriptor;
+use rerun::external::arrow::array::{
+    Array as _, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, StringArray, UInt8Array,
+    UInt32Array,
+};
+use rerun::external::arrow::buffer::Buffer;
+use rerun::external::arrow::datatypes::Field;
+use std::io;
+use std::sync::Arc;
+
+/// A number that a cell holds.
+pub(super) trait Number: Copy {
+    fn array(values: Vec<Self>) -> ArrayRef;
+}
+
+macro_rules! numbers {
+    ($($number:ty: $array:ty),*) => {$(
+        impl Number for $number {
+            fn array(values: Vec<Self>) -> ArrayRef {
+                Arc::new(<$array>::from(values))
+            }
+        }
+    )*};
+}
+
+numbers!(f32: Float32Array, f64: Float64Array, u32: UInt32Array, u8: UInt8Array);
+
+/// Cells in the making; their rows are those of the strips or points beside which they stand.
+#[derive(Clone)]
+pub(super) struct Cells<T, const W: usize> {
+    values: Vec<[T; W]>,
+    /// Where the cells of each row end.
+    rows: Vec<usize>,
+}
+
+impl<T, const W: usize> Default for Cells<T, W> {
+    fn default() -> Self {
+        Self {
+            values: Vec::new(),
+            rows: Vec::new(),
+        }
+    }
+}
+
+impl<T: Number, const W: usize> Cells<T, W> {
+    /// Room for as much as `other` holds.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            values: Vec::with_capacity(other.values.len() + other.values.len() / 8),
+            rows: Vec::with_capacity(other.rows.len()),
+        }
+    }
+
+    /// Adds a cell to the row at hand.
+    pub fn push(&mut self, cell: [T; W]) {
+        self.values.push(cell);
+    }
+
+    /// Adds cells to the row at hand.
+    pub fn extend(&mut self, cells: impl IntoIterator<Item = [T; W]>) {
+        self.values.extend(cells);
+    }
+
+    /// Closes the row at hand.
+    pub fn end_row(&mut self) {
+        self.rows.push(self.values.len());
+    }
+
+    /// The component of all rows.
+    pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
+        let rows = offsets(&self.rows)?;
+        let mut values = T::array(self.values.into_flattened());
+        if W > 1 {
+            let item = Arc::new(Field::new("item", values.data_type().clone(), false));
+            values = Arc::new(FixedSizeListArray::new(item, W as i32, values, None));
+        }
+        Ok((descriptor, lists(rows, values)))
+    }
+}
+
+/// Rows of short texts, one for each instance.
+#[derive(Clone, Default)]
+pub(super) struct Texts {
+    text: String,
+    /// Where each text ends.
+    ends: Vec<usize>,
+    /// Where the texts of each row end.
+    rows: Vec<usize>,
+}
+
+impl Texts {
+    /// Room for as much as `other` holds.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            text: String::with_capacity(other.text.len() + other.text.len() / 8),
+            ends: Vec::with_capacity(other.ends.len()),
+            rows: Vec::with_capacity(other.rows.len()),
+        }
+    }
+
+    /// Adds to the text at hand.
+    pub fn push(&mut self, text: &str) {
+        self.text.push_str(text);
+    }
+
+    /// Adds a count to the text at hand.
+    pub fn push_count(&mut self, count: u32) {
+        let first = self.text.len();
+        let mut rest = count;
+        loop {
+            self.text.insert(first, digit(rest));
+            rest /= 10;
+            if rest == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Adds a number to the text at hand, rounded to three digits: `0.0346`, `12.3`, `461`, `4.61e-8`. The general way to
+    /// print a number takes ten times as long.
+    pub fn push_number(&mut self, x: f64) {
+        if !(1e-300..1e300).contains(&x) {
+            self.text.push_str(if x == 0.0 { "0" } else { "?" });
+            return;
+        }
+        // x is about m · 10⁻ᵏ with 100 ≤ m < 1000.
+        let (mut m, mut k) = (x, 0_i32);
+        while m < 99.95 {
+            (m, k) = (10.0 * m, k + 1);
+        }
+        while m >= 999.5 {
+            (m, k) = (0.1 * m, k - 1);
+        }
+        let m = (m + 0.5) as u32;
+        if (0..=6).contains(&k) {
+            let one = 10_u32.pow(k.unsigned_abs());
+            self.push_count(m / one);
+            let (mut place, rest) = (one / 10, m % one);
+            if place > 0 {
+                self.text.push('.');
+            }
+            while place > 0 {
+                self.text.push(digit(rest / place));
+                place /= 10;
+            }
+        } else {
+            for c in [digit(m / 100), '.', digit(m / 10), digit(m), 'e'] {
+                self.text.push(c);
+            }
+            if k > 2 {
+                self.text.push('-');
+            }
+            self.push_count((2 - k).unsigned_abs());
+        }
+    }
+
+    /// Closes the text at hand.
+    pub fn end_cell(&mut self) {
+        self.ends.push(self.text.len());
+    }
+
+    /// Closes the row at hand.
+    pub fn end_row(&mut self) {
+        self.rows.push(self.ends.len());
+    }
+
+    /// The component of all rows.
+    pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
+        let (ends, rows) = (offsets(&self.ends)?, offsets(&self.rows)?);
+        let texts = StringArray::try_new(ends, Buffer::from(self.text.into_bytes()), None);
+        let texts = texts.map_err(io::Error::other)?;
+        Ok((descriptor, lists(rows, Arc::new(texts))))
+    }
+}
+
+/// The last digit of `n`.
+fn digit(n: u32) -> char {
+    char::from(b'0' + (n % 10) as u8)
+}
+
+/// A component of our own, `softjam.Archetype:field`.
+pub(super) fn own(component: &'static str) -> ComponentDescriptor {
+    let archetype = component.split(':').next().unwrap_or(component);
+    ComponentDescriptor {
+        archetype: Some(archetype.into()),
+        component: component.into(),
+        component_type: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_printed_to_three_digits() {
+        let printed = |x| {
+            let mut texts = Texts::default();
+            texts.push_number(x);
+            texts.text
+        };
+        for (x, text) in [
+            (0.0, "0"),
+            (0.125, "0.125"),
+            (0.034_56, "0.0346"),
+            (0.000_999_7, "0.00100"),
+            (12.34, "12.3"),
+            (461.2, "461"),
+            (9.999, "10.0"),
+            (1.0, "1.00"),
+            (0.000_123, "0.000123"),
+            (4.607e-8, "4.61e-8"),
+            (1234.0, "1.23e3"),
+            (5e22, "5.00e22"),
+            (f64::NAN, "?"),
+        ] {
+            assert_eq!(printed(x), text);
+        }
+        // Against the library's own rounding, wherever the two print in the same way.
+        for n in 1..2000_u32 {
+            let x = f64::from(n) * 7.3e-4;
+            let value: f64 = printed(x).parse().unwrap();
+            assert!(
+                (value / x - 1.0).abs() < 0.005_001,
+                "{x} is printed as {value}"
+            );
+        }
+    }
+
+    #[test]
+    fn counts_are_printed_in_full() {
+        let mut texts = Texts::default();
+        for n in [0, 7, 10, 4_294_967_295] {
+            texts.push_count(n);
+            texts.push(" ");
+        }
+        assert_eq!(texts.text, "0 7 10 4294967295 ");
+    }
+}

@@ -1,0 +1,164 @@
+//! What does not change in a recording: scene, axes, box, radii, and how things look.
+
+use super::columns::array;
+use super::encode::Encoder;
+use super::{FORMAT_VERSION, Header, PROGRAM, legend};
+use crate::scene::Start;
+use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
+use rerun::external::re_log_types::StoreId;
+use rerun::{
+    AsComponents, Color, DynamicArchetype, Ellipses2D, LineStrips2D, Points2D, Radius,
+    RecordingInfo, TextDocument, TimePoint, Transform3D,
+};
+use std::io::{self, Write};
+
+/// The radius of a particle's point, in radii of the smallest particle: one size for all, so that it is not taken for the
+/// particle.
+const POINT: f64 = 0.8;
+
+/// Writes the header into a store.
+pub(super) fn write<W: Write>(
+    encoder: &mut Encoder<W>,
+    store: &StoreId,
+    header: &Header,
+) -> io::Result<()> {
+    let mut put = |entity: &str, data: &dyn AsComponents| {
+        encoder.single(store, entity, TimePoint::default(), data)
+    };
+    let (packing, channels) = (&header.packing, &header.scene.channels);
+    let l = packing.domain().lengths();
+    // What the viewer lists the recording as.
+    let name = format!(
+        "N = {}, φ = {:.3}, seed {}",
+        packing.len(),
+        packing.coverage(),
+        header.scene.seed
+    );
+    put("/__properties", &RecordingInfo::new().with_name(name))?;
+    put("/scene", &TextDocument::from_markdown(text(header)))?;
+    put("/scene", &scene(header))?;
+    let particles = DynamicArchetype::new("softjam.Particles")
+        .with_component_from_data(
+            "radius",
+            array(Float64Array::from(packing.radii().to_vec())),
+        )
+        .with_component_from_data("box", array(Float64Array::from(vec![l.x, l.y])));
+    put("/particles", &particles)?;
+    // Rerun's 2D views have y down, a packing has it up.
+    let up = Transform3D::from_mat3x3([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
+    put("/world", &up)?;
+    let (x, y) = (l.x as f32, l.y as f32);
+    let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
+    let edge = LineStrips2D::new([corners])
+        .with_colors([Color::from_rgb(200, 200, 200)])
+        .with_radii([Radius::new_ui_points(1.0)])
+        .with_draw_order(40.0);
+    put("/world/box", &edge)?;
+    let outline = |width: f32, order: f32| {
+        LineStrips2D::update_fields()
+            .with_radii([Radius::new_ui_points(width)])
+            .with_draw_order(order)
+    };
+    if channels.contours.is_on() {
+        put("/world/contours", &outline(1.3, 20.0))?;
+        put("/world/contours/images", &outline(0.9, 15.0))?;
+        let least = packing
+            .radii()
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let points = Points2D::update_fields()
+            .with_radii([(POINT * least) as f32])
+            .with_draw_order(10.0);
+        put("/world/particles", &points)?;
+        let radii = packing.radii().iter().map(|r| [*r as f32; 2]);
+        let disks = Ellipses2D::update_fields()
+            .with_half_sizes(radii)
+            .with_colors([Color::from_rgb(255, 255, 255)])
+            .with_line_radii([Radius::new_ui_points(0.8)])
+            .with_draw_order(25.0);
+        put("/world/disks", &disks)?;
+    }
+    if channels.contacts.is_on() {
+        let order = |order: f32| LineStrips2D::update_fields().with_draw_order(order);
+        put("/world/contacts", &order(31.0))?;
+        put("/world/contacts/images", &order(30.0))?;
+    }
+    legend::write(header, put)
+}
+
+fn scene(header: &Header) -> DynamicArchetype {
+    let toml = header.scene.to_toml();
+    DynamicArchetype::new("softjam.Scene")
+        .with_component_from_data("toml", array(StringArray::from(vec![toml])))
+        .with_component_from_data(
+            "format_version",
+            array(UInt32Array::from(vec![FORMAT_VERSION])),
+        )
+        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])))
+        .with_component_from_data(
+            "from_step",
+            array(UInt64Array::from(vec![header.from_step])),
+        )
+}
+
+/// What a person who opens the recording reads beside the pictures.
+fn text(header: &Header) -> String {
+    let (scene, packing) = (&header.scene, &header.packing);
+    let l = packing.domain().lengths();
+    let start = match &scene.start {
+        Start::Random => format!("a random start, seed {}", scene.seed),
+        Start::Hexagonal => "a hexagonal crystal".to_owned(),
+        Start::File { path, .. } => format!("the packing in `{path}`"),
+    };
+    let first = match header.from_step {
+        0 => String::new(),
+        step => format!(" The recording begins with step {step}."),
+    };
+    let mut text = format!(
+        "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
+         {:.3} × {:.3}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
+         {PROGRAM}.\n\n",
+        packing.len(),
+        packing.coverage(),
+        l.x,
+        l.y,
+        scene.line_tension,
+        scene.threshold,
+    );
+    let channels = &scene.channels;
+    let missing: Vec<&str> = [
+        ("contours", channels.contours),
+        ("contacts", channels.contacts),
+        ("metrics", channels.metrics),
+    ]
+    .into_iter()
+    .filter_map(|(name, schedule)| (!schedule.is_on()).then_some(name))
+    .collect();
+    if !missing.is_empty() {
+        let how = if channels.state.is_on() {
+            ": `softjam convert THIS.rrd WHOLE.rrd --channels contours,contacts,metrics,state` brings them back from the states"
+        } else {
+            ""
+        };
+        text += &format!(
+            "**This recording has no {}**{how}.\n\n",
+            missing.join(", no ")
+        );
+    }
+    if channels.contours.is_on() || channels.contacts.is_on() {
+        text += "| in the picture | |\n| --- | --- |\n";
+    }
+    if channels.contours.is_on() {
+        text += "| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
+             | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
+             | gray | rattler: fewer than three contacts that bear a force |\n\
+             | disk in it | hover it for its number, p (γ/length), number of contacts Z, max abs ΔR/R |\n\
+             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n";
+    }
+    if channels.contacts.is_on() {
+        text += "| line | contact; width and colour: force f over the mean (inferno, 0 to 3); click it for its pair, f (γ) and overlap δ |\n";
+    }
+    text += &format!("\nThe whole scene:\n\n```toml\n{}```\n", scene.to_toml());
+    text
+}
