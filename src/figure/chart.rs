@@ -13,6 +13,7 @@ use plotters::prelude::{
 };
 use plotters::series::LineSeries;
 use plotters::style::{BLACK, Color, RGBColor, ShapeStyle, WHITE};
+use std::collections::BTreeSet;
 
 /// How the numbers of an axis are spaced.
 ///
@@ -289,8 +290,11 @@ fn draw(
 
 /// The corner in which a legend hides the fewest points.
 fn emptiest(across: &Ruler, up: &Ruler, curves: &[Curve]) -> SeriesLabelPosition {
-    // What a legend takes of the sheet, and more.
-    let (width, height) = (0.4, 0.25);
+    // What a legend takes of the sheet, and a little more.
+    let labels: BTreeSet<&str> = curves.iter().map(|c| c.label.as_str()).collect();
+    let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0);
+    let width = (60.0 + 8.0 * longest as f64) / f64::from(SIZE.0 - 100);
+    let height = (20.0 + 20.0 * labels.len() as f64) / f64::from(SIZE.1 - 60);
     let part = |ruler: &Ruler, value| {
         let at = ruler.scale.place(value)? - ruler.ends.start;
         Some(at / (ruler.ends.end - ruler.ends.start))
