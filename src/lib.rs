@@ -88,3 +88,4 @@ pub mod relax;
 pub mod replay;
 pub mod scene;
 mod simplicial;
+mod wide;

@@ -4,6 +4,7 @@ use super::list::{ContactList, DuplicateContactList};
 use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
+use crate::wide::wide;
 use core::f64::consts::PI;
 use core::ops::Range;
 
@@ -118,6 +119,14 @@ impl Geometry {
     /// Computes everything anew for the positions of `packing`; `contacts` is the list that the structure is of.
     pub(crate) fn refresh(&mut self, packing: &Packing, contacts: &ContactList) {
         assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
+        wide(
+            #[inline(always)]
+            || self.refresh_here(packing, contacts),
+        );
+    }
+
+    #[inline(always)]
+    fn refresh_here(&mut self, packing: &Packing, contacts: &ContactList) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
         let toward = &mut self.toward[..];

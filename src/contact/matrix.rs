@@ -5,6 +5,7 @@ pub use super::geometry::Geometry;
 use super::list::{ContactList, DuplicateContactList};
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
+use crate::wide::wide;
 use core::f64::consts::PI;
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
@@ -215,6 +216,14 @@ impl ContactMatrix {
 
     /// The values, from the directions of the contacts.
     pub(crate) fn refresh(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
+        wide(
+            #[inline(always)]
+            || self.refresh_here(packing, geometry, line_tension),
+        );
+    }
+
+    #[inline(always)]
+    fn refresh_here(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let (mut block, mut value) = (0, 0);
         for &(z, count) in &self.runs {
@@ -322,6 +331,15 @@ impl ContactMatrix {
     /// ContactMatrix::default().multiply(&[], &mut []);
     /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        wide(
+            #[inline(always)]
+            || self.multiply_here(x, y),
+        );
+    }
+
+    /// [`multiply`](Self::multiply), to be inlined into loops that are compiled for wide vectors.
+    #[inline(always)]
+    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64]) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
         for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
@@ -331,6 +349,7 @@ impl ContactMatrix {
     }
 
     /// `y += (A − diag A) x`.
+    #[inline(always)]
     pub(crate) fn add_off_diagonal(&self, x: &[f64], y: &mut [f64]) {
         let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
         for &(z, count) in &self.runs {
@@ -351,7 +370,7 @@ impl ContactMatrix {
 }
 
 /// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.
-#[inline]
+#[inline(always)]
 fn fill<'a, const Z: usize, const T: usize>(
     blocks: impl Iterator<Item = (f64, &'a [Direction])>,
     values: &mut [f64],
@@ -367,6 +386,7 @@ fn fill<'a, const Z: usize, const T: usize>(
     }
 }
 
+#[inline(always)]
 fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
     let mut values = values.iter_mut();
     for b in 1..toward.len() {
@@ -377,7 +397,7 @@ fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
 }
 
 /// `y += A x` of blocks of `Z` contacts.
-#[inline]
+#[inline(always)]
 fn product<const Z: usize, const T: usize>(
     contacts: &[u32],
     values: &[f64],
@@ -405,6 +425,7 @@ fn product<const Z: usize, const T: usize>(
 }
 
 /// `y += A x` of one block of any size.
+#[inline(always)]
 fn product_of_block(contacts: &[u32], values: &[f64], x: &[f64], y: &mut [f64]) {
     let mut values = values.iter();
     for (b, &cb) in contacts.iter().enumerate() {

@@ -36,7 +36,7 @@ impl Angles {
     }
 
     /// The angle of a *unit* vector to the x axis, in `[−π, π]` (radians); its error is below 9e-16.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(self, unit: Vec2) -> f64 {
         let (x, y) = (unit.x.abs(), unit.y.abs());
         let (a, b) = (x.min(y), x.max(y));

@@ -2,6 +2,7 @@
 
 use super::SolverError;
 use crate::contact::matrix::ContactMatrix;
+use crate::wide::wide;
 
 /// Conjugate gradients with the diagonal as preconditioner; owns its vectors, so a solve allocates nothing once they are
 /// long enough.
@@ -97,17 +98,32 @@ impl ConjugateGradient {
 
     /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is).
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
-        matrix.multiply(forces, &mut self.image);
-        let mut largest: f64 = 0.0;
-        for ((r, q), d) in self.residual.iter_mut().zip(&self.image).zip(overlaps) {
-            *r = d - q;
-            largest = if r.abs() <= largest { largest } else { r.abs() };
-        }
-        largest
+        let (residual, image) = (&mut self.residual[..], &mut self.image[..]);
+        wide(
+            #[inline(always)]
+            || {
+                matrix.multiply_here(forces, image);
+                subtract(residual, overlaps, image)
+            },
+        )
     }
 
     /// Iterates from the residual at hand until the recurrence's residual meets the tolerance.
     fn descend(
+        &mut self,
+        matrix: &ContactMatrix,
+        forces: &mut [f64],
+        tolerance: f64,
+        most: usize,
+    ) -> Result<usize, SolverError> {
+        wide(
+            #[inline(always)]
+            || self.descend_here(matrix, forces, tolerance, most),
+        )
+    }
+
+    #[inline(always)]
+    fn descend_here(
         &mut self,
         matrix: &ContactMatrix,
         forces: &mut [f64],
@@ -158,7 +174,30 @@ impl ConjugateGradient {
     }
 }
 
+/// `r = d − q`; returns the largest magnitude, NaN if any is.
+#[inline(always)]
+fn subtract(residual: &mut [f64], overlaps: &[f64], image: &[f64]) -> f64 {
+    let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
+    let (r8, r_rest) = residual.as_chunks_mut::<8>();
+    let (d8, d_rest) = overlaps.as_chunks::<8>();
+    let (q8, q_rest) = image.as_chunks::<8>();
+    let mut largest = [0.0; 8];
+    for ((r, d), q) in r8.iter_mut().zip(d8).zip(q8) {
+        for k in 0..8 {
+            r[k] = d[k] - q[k];
+            largest[k] = larger(largest[k], r[k].abs());
+        }
+    }
+    let mut most = largest.into_iter().fold(0.0, larger);
+    for ((r, d), q) in r_rest.iter_mut().zip(d_rest).zip(q_rest) {
+        *r = d - q;
+        most = larger(most, r.abs());
+    }
+    most
+}
+
 /// The next direction `p = D⁻¹ r + β p`, and the diagonal's part of its image, `q = D p`.
+#[inline(always)]
 fn turn(
     direction: &mut [f64],
     image: &mut [f64],
@@ -174,6 +213,7 @@ fn turn(
 }
 
 /// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` behind it. The sum has four chains.
+#[inline(always)]
 fn advance(
     forces: &mut [f64],
     residual: &mut [f64],
@@ -216,6 +256,7 @@ fn advance(
 }
 
 /// The sum of products in one fixed order, four chains wide.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, a_rest) = a.as_chunks::<4>();
     let (b4, b_rest) = b.as_chunks::<4>();
