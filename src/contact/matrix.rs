@@ -3,9 +3,10 @@
 pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
+use super::product::{Number, product, product_of_block, scale, scale_block};
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
-use crate::wide::wide;
+use crate::wide::{largest_magnitude, wide};
 use core::f64::consts::PI;
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
@@ -44,6 +45,10 @@ use core::f64::consts::PI;
 pub struct ContactMatrix {
     diagonal: Vec<f64>,
     inverse_diagonal: Vec<f64>,
+    /// `A_cc^(−½)`.
+    scaling: Vec<f64>,
+    /// The largest `A_cc^½`.
+    largest_root: f64,
     /// The particle of each block.
     particle: Vec<u32>,
     /// Where each block's contacts and values begin, and where the last ends.
@@ -123,9 +128,13 @@ impl ContactMatrix {
                 *compliance = -G_AT_CONTACT * per_radius * sum;
             }
         }
-        for (inverse, compliance) in self.inverse_diagonal.iter_mut().zip(&self.diagonal) {
+        self.scaling.resize(contacts.len(), 0.0);
+        let inverses = self.inverse_diagonal.iter_mut().zip(&mut self.scaling);
+        for ((inverse, scaling), compliance) in inverses.zip(&self.diagonal) {
             *inverse = 1.0 / compliance;
+            *scaling = inverse.sqrt();
         }
+        self.largest_root = largest_magnitude(&self.diagonal).sqrt();
         self.sort_blocks(duplicate);
         self.ends.clear();
         self.ends.resize(contacts.len(), [NO_BLOCK; 2]);
@@ -289,6 +298,16 @@ impl ContactMatrix {
         &self.inverse_diagonal
     }
 
+    /// `A_cc^(−½)`.
+    pub(crate) fn scaling(&self) -> &[f64] {
+        &self.scaling
+    }
+
+    /// The largest `A_cc^½`.
+    pub(crate) fn largest_root(&self) -> f64 {
+        self.largest_root
+    }
+
     /// The off-diagonal entries of row `c` as `(column, value)`, in no particular order of columns.
     ///
     /// # Panics
@@ -351,19 +370,49 @@ impl ContactMatrix {
     /// `y += (A − diag A) x`.
     #[inline(always)]
     pub(crate) fn add_off_diagonal(&self, x: &[f64], y: &mut [f64]) {
-        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
+        self.add_product(&self.value, x, y);
+    }
+
+    /// `y += V x` with other values in the places of the off-diagonal entries: `values` are in their order.
+    #[inline(always)]
+    pub(crate) fn add_product<F: Number>(&self, values: &[F], x: &[F], y: &mut [F]) {
+        let (mut contacts, mut values) = (&self.contact[..], values);
         for &(z, count) in &self.runs {
             let (c, v);
             (c, contacts) = contacts.split_at(count * z);
             (v, values) = values.split_at(count * (z * (z - 1) / 2));
             match z {
-                2 => product::<2, 1>(c, v, x, y),
-                3 => product::<3, 3>(c, v, x, y),
-                4 => product::<4, 6>(c, v, x, y),
-                5 => product::<5, 10>(c, v, x, y),
-                6 => product::<6, 15>(c, v, x, y),
-                7 => product::<7, 21>(c, v, x, y),
+                2 => product::<F, 2, 1>(c, v, x, y),
+                3 => product::<F, 3, 3>(c, v, x, y),
+                4 => product::<F, 4, 6>(c, v, x, y),
+                5 => product::<F, 5, 10>(c, v, x, y),
+                6 => product::<F, 6, 15>(c, v, x, y),
+                7 => product::<F, 7, 21>(c, v, x, y),
                 _ => product_of_block(c, v, x, y),
+            }
+        }
+    }
+
+    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1.
+    #[inline(always)]
+    pub(crate) fn scale_off_diagonal(&self, scaled: &mut Vec<f32>) {
+        scaled.resize(self.value.len(), 0.0);
+        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
+        let mut scaled = &mut scaled[..];
+        for &(z, count) in &self.runs {
+            let (c, v, s);
+            (c, contacts) = contacts.split_at(count * z);
+            (v, values) = values.split_at(count * (z * (z - 1) / 2));
+            (s, scaled) = scaled.split_at_mut(count * (z * (z - 1) / 2));
+            let by = &self.scaling[..];
+            match z {
+                2 => scale::<2, 1>(c, v, by, s),
+                3 => scale::<3, 3>(c, v, by, s),
+                4 => scale::<4, 6>(c, v, by, s),
+                5 => scale::<5, 10>(c, v, by, s),
+                6 => scale::<6, 15>(c, v, by, s),
+                7 => scale::<7, 21>(c, v, by, s),
+                _ => scale_block(c, v, by, s),
             }
         }
     }
@@ -392,46 +441,6 @@ fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
     for b in 1..toward.len() {
         for (a, value) in toward[..b].iter().zip(&mut values) {
             *value = scale * a.g_between(toward[b]);
-        }
-    }
-}
-
-/// `y += A x` of blocks of `Z` contacts.
-#[inline(always)]
-fn product<const Z: usize, const T: usize>(
-    contacts: &[u32],
-    values: &[f64],
-    x: &[f64],
-    y: &mut [f64],
-) {
-    let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
-    for (c, v) in contacts.iter().zip(values) {
-        let mut at = [0.0; Z];
-        for (at, c) in at.iter_mut().zip(c) {
-            *at = x[*c as usize];
-        }
-        let mut sum = [0.0; Z];
-        for b in 1..Z {
-            for a in 0..b {
-                let entry = v[b * (b - 1) / 2 + a];
-                sum[a] += entry * at[b];
-                sum[b] += entry * at[a];
-            }
-        }
-        for (c, sum) in c.iter().zip(sum) {
-            y[*c as usize] += sum;
-        }
-    }
-}
-
-/// `y += A x` of one block of any size.
-#[inline(always)]
-fn product_of_block(contacts: &[u32], values: &[f64], x: &[f64], y: &mut [f64]) {
-    let mut values = values.iter();
-    for (b, &cb) in contacts.iter().enumerate() {
-        for (&ca, entry) in contacts[..b].iter().zip(&mut values) {
-            y[ca as usize] += entry * x[cb as usize];
-            y[cb as usize] += entry * x[ca as usize];
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Preconditioned conjugate gradients.
 
 use super::SolverError;
+use super::single::Single;
 use crate::contact::matrix::ContactMatrix;
 use crate::wide::wide;
 
@@ -16,6 +17,7 @@ pub struct ConjugateGradient {
     direction: Vec<f64>,
     image: Vec<f64>,
     largest: f64,
+    single: Single,
 }
 
 impl ConjugateGradient {
@@ -40,7 +42,9 @@ impl ConjugateGradient {
         tolerance: f64,
     ) -> Result<usize, SolverError> {
         let (most, mut iterations) = (self.prepare(matrix), 0);
+        let mut quickly = true;
         loop {
+            let before = self.largest;
             self.largest = self.true_residual(matrix, overlaps, forces);
             if self.largest <= tolerance {
                 return Ok(iterations);
@@ -48,12 +52,21 @@ impl ConjugateGradient {
             if iterations >= most || !self.largest.is_finite() {
                 return Err(self.not_converged(tolerance, iterations));
             }
-            iterations += self.descend(matrix, forces, tolerance, most - iterations)?;
+            if iterations == 0 {
+                self.single.take(matrix);
+            } else {
+                quickly &= self.largest <= 0.5 * before;
+            }
+            if quickly && let Some((more, _)) = self.correct(matrix, forces, tolerance) {
+                iterations += more;
+            } else {
+                iterations += self.descend(matrix, forces, tolerance, most - iterations)?;
+            }
         }
     }
 
-    /// [`solve`](Self::solve) to a tolerance far above round-off: the residual is the recurrence's own, which differs from
-    /// the true one by round-off alone. Saves a product with the matrix.
+    /// [`solve`](Self::solve) to a tolerance far above round-off: the residual tested last is the recurrence's own with
+    /// a bound of its round-off. Saves a product with the matrix.
     pub(crate) fn solve_loosely(
         &mut self,
         matrix: &ContactMatrix,
@@ -61,17 +74,44 @@ impl ConjugateGradient {
         forces: &mut [f64],
         tolerance: f64,
     ) -> Result<usize, SolverError> {
-        let most = self.prepare(matrix);
-        self.largest = self.true_residual(matrix, overlaps, forces);
-        if self.largest <= tolerance {
-            return Ok(0);
+        let (most, mut iterations) = (self.prepare(matrix), 0);
+        loop {
+            let before = self.largest;
+            self.largest = self.true_residual(matrix, overlaps, forces);
+            if self.largest <= tolerance {
+                return Ok(iterations);
+            }
+            if iterations == 0 {
+                self.single.take(matrix);
+            } else if self.largest > 0.5 * before {
+                break;
+            }
+            let Some((more, bound)) = self.correct(matrix, forces, tolerance) else {
+                break;
+            };
+            iterations += more;
+            if bound <= tolerance {
+                self.largest = bound;
+                return Ok(iterations);
+            }
         }
-        let iterations = self.descend(matrix, forces, tolerance, most)?;
+        iterations += self.descend(matrix, forces, tolerance, most)?;
         if self.largest <= tolerance {
             Ok(iterations)
         } else {
             Err(self.not_converged(tolerance, iterations))
         }
+    }
+
+    /// A round of the correction in single precision; see [`Single::correct`].
+    fn correct(
+        &mut self,
+        matrix: &ContactMatrix,
+        forces: &mut [f64],
+        tolerance: f64,
+    ) -> Option<(usize, f64)> {
+        let residual = &self.residual;
+        self.single.correct(matrix, residual, forces, tolerance)
     }
 
     /// Makes room; returns the most iterations that are tried.
