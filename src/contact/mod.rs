@@ -29,7 +29,7 @@ pub mod list;
 pub mod matrix;
 mod mend;
 mod patch;
-mod product;
+pub(crate) mod product;
 pub mod solver;
 mod tolerance;
 

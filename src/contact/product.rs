@@ -3,7 +3,7 @@
 use core::ops::{AddAssign, Mul};
 
 /// What is multiplied: in double or in single precision.
-pub(super) trait Number: Copy + Default + AddAssign + Mul<Output = Self> {}
+pub(crate) trait Number: Copy + Default + AddAssign + Mul<Output = Self> {}
 
 impl Number for f64 {}
 impl Number for f32 {}

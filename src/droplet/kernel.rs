@@ -147,7 +147,7 @@ impl Direction {
     /// assert_eq!((west.cos, west.angle), (-1.0, std::f64::consts::PI));
     /// ```
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn opposite(self) -> Self {
         Self {
             cos: -self.cos,
