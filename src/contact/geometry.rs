@@ -29,12 +29,16 @@ pub struct Geometry {
     distances: Vec<f64>,
     overlaps: Vec<f64>,
     duplicate: DuplicateContactList,
-    /// The angles of the directions from the lower particle to the higher, `−n` (radians).
-    angles: Vec<f64>,
+    /// Parallel to the duplicate list: the direction from the particle to its partner.
+    toward: Vec<Direction>,
     /// Components of the normals, for the loops of [`refresh`](Self::refresh).
     x: Vec<f64>,
     y: Vec<f64>,
+    /// The angles of the directions from the lower particle to the higher, likewise, and room for their making.
+    angles: Vec<f64>,
     nodes: Vec<[f64; 2]>,
+    /// Room for [`exchange`](Self::exchange): the directions from the lower particles to the higher.
+    lower: Vec<Direction>,
 }
 
 /// A stretch of contacts that stay, and the pair that comes behind it.
@@ -110,7 +114,7 @@ impl Geometry {
         self.normals.resize(contacts.len(), Vec2::zeros());
         self.distances.resize(contacts.len(), 0.0);
         self.overlaps.resize(contacts.len(), 0.0);
-        self.angles.resize(contacts.len(), 0.0);
+        self.toward.resize(2 * contacts.len(), NOWHERE);
     }
 
     /// Computes everything anew for the positions of `packing`; `contacts` is the list that the structure is of.
@@ -126,6 +130,8 @@ impl Geometry {
     fn refresh_here(&mut self, packing: &Packing, contacts: &ContactList) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
+        let toward = &mut self.toward[..];
+        let slots = self.duplicate.slots();
         let angles = Angles::new();
         let mut begin = 0;
         // Some particles at a time, so that what is computed of them stays in the fastest memory.
@@ -137,6 +143,7 @@ impl Geometry {
             if self.x.len() < count {
                 self.x.resize(count, 0.0);
                 self.y.resize(count, 0.0);
+                self.angles.resize(count, 0.0);
             }
             let (x, y) = (&mut self.x[..count], &mut self.y[..count]);
             let distances = &mut self.distances[range.clone()];
@@ -175,26 +182,51 @@ impl Geometry {
                 *normal = Vec2::new(*x, *y);
                 (*x, *y) = (-*x, -*y);
             }
-            angles.of_columns((x, y), &mut self.nodes, &mut self.angles[range]);
+            let own = &mut self.angles[..count];
+            angles.of_columns((x, y), &mut self.nodes, own);
+            let slots = &slots[range];
+            for ((slots, angle), (x, y)) in slots.iter().zip(own).zip(x.iter().zip(&*y)) {
+                let direction = Direction {
+                    cos: *x,
+                    sin: *y,
+                    angle: *angle,
+                };
+                toward[slots[0] as usize] = direction;
+                toward[slots[1] as usize] = direction.opposite();
+            }
         }
     }
 
     /// Takes over other contacts at the same positions. `kept` are stretches of the contacts as they were, each but the
     /// last followed by a new contact if it says so; only new contacts are computed.
     pub(crate) fn exchange(&mut self, packing: &Packing, contacts: &ContactList, kept: &[Kept]) {
+        self.lower.clear();
+        let slots = self.duplicate.slots();
+        for part in kept {
+            let slots = &slots[part.range.clone()];
+            let toward = slots.iter().map(|s| self.toward[s[0] as usize]);
+            self.lower.extend(toward);
+            if part.then.is_some() {
+                self.lower.push(NOWHERE);
+            }
+        }
         rearrange(&mut self.normals, kept, Vec2::zeros());
         rearrange(&mut self.distances, kept, 0.0);
         rearrange(&mut self.overlaps, kept, 0.0);
-        rearrange(&mut self.angles, kept, 0.0);
         for (place, [i, j]) in arrivals(kept) {
             let (i, j) = (i as usize, j as usize);
             let (normal, distance) = unit_and_length(packing.separation(i, j));
             self.normals[place] = normal;
-            self.angles[place] = Direction::of(-normal).angle;
+            self.lower[place] = Direction::of(-normal);
             self.distances[place] = distance;
             self.overlaps[place] = packing.radii()[i] + packing.radii()[j] - distance;
         }
         self.restructure(contacts);
+        let rows = self.lower.iter().zip(self.duplicate.slots());
+        for (direction, slots) in rows {
+            self.toward[slots[0] as usize] = *direction;
+            self.toward[slots[1] as usize] = direction.opposite();
+        }
     }
 
     /// The unit vectors `n_ij = (r_i − r_j)/r_ij`; the force on `i` is `+f_ij n_ij`.
@@ -246,23 +278,8 @@ impl Geometry {
     }
 
     /// The directions from particle `p` to its partners, in the order of the duplicate list.
-    pub(crate) fn toward(&self, p: usize) -> impl Iterator<Item = Direction> + '_ {
-        let own = self.duplicate.own(p);
-        let contacts = self.duplicate.contacts(p);
-        contacts.iter().map(move |&c| self.direction(c, own))
-    }
-
-    /// The direction of contact `c` seen from one of its particles, of which `own` is the
-    /// [first contact](DuplicateContactList::own) with a higher one.
-    #[inline(always)]
-    pub(crate) fn direction(&self, c: u32, own: u32) -> Direction {
-        let normal = self.normals[c as usize];
-        let lower = Direction {
-            cos: -normal.x,
-            sin: -normal.y,
-            angle: self.angles[c as usize],
-        };
-        if c < own { lower.opposite() } else { lower }
+    pub(crate) fn toward(&self, p: usize) -> &[Direction] {
+        &self.toward[self.duplicate.entries(p)]
     }
 
     /// The gap between the deformed contours of particles `i < j` that are not in contact (length):
@@ -291,8 +308,9 @@ impl Geometry {
     fn displacement(&self, scale: f64, p: usize, direction: Direction, forces: &[f64]) -> f64 {
         let sum: f64 = self
             .toward(p)
+            .iter()
             .zip(self.duplicate.contacts(p))
-            .map(|(d, &c)| forces[c as usize] * direction.g_between(d))
+            .map(|(d, &c)| forces[c as usize] * direction.g_between(*d))
             .sum();
         scale * sum
     }
@@ -300,6 +318,12 @@ impl Geometry {
 
 /// Particles whose contacts are computed together.
 const TOGETHER: usize = 256;
+
+const NOWHERE: Direction = Direction {
+    cos: 0.0,
+    sin: 0.0,
+    angle: 0.0,
+};
 
 #[cfg(test)]
 mod tests {

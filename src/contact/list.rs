@@ -142,8 +142,8 @@ pub struct DuplicateContactList {
     first: Vec<u32>,
     partner: Vec<u32>,
     contact: Vec<u32>,
-    /// The first contact of each particle with a higher one.
-    own: Vec<u32>,
+    /// Where contact c stands in the row of its lower and in that of its higher particle.
+    slots: Vec<[u32; 2]>,
     next: Vec<u32>,
 }
 
@@ -180,28 +180,27 @@ impl DuplicateContactList {
         self.next.extend_from_slice(&self.first);
         self.partner.resize(2 * contacts.len(), 0);
         self.contact.resize(2 * contacts.len(), 0);
-        self.own.clone_from(&contacts.first);
+        self.slots.resize(contacts.len(), [0; 2]);
         let (next, partner, contact) = (&mut *self.next, &mut *self.partner, &mut *self.contact);
         let mut place = |c: u32, p: u32, q: u32| {
             let next = &mut next[p as usize];
-            let slot = *next as usize;
+            let slot = *next;
             *next += 1;
-            (partner[slot], contact[slot]) = (q, c);
+            (partner[slot as usize], contact[slot as usize]) = (q, c);
+            slot
         };
         // Pairs ascend, so a particle meets first its lower partners and then its higher ones, each ascending.
-        let mut numbers = 0..;
+        let mut slots = (0..).zip(&mut self.slots);
         for i in 0..particles as u32 {
-            // The partners first: when they run out, no number is taken.
-            for (&j, c) in contacts.partners(i as usize).iter().zip(&mut numbers) {
-                place(c, i, j);
-                place(c, j, i);
+            for (&j, (c, slots)) in contacts.partners(i as usize).iter().zip(&mut slots) {
+                *slots = [place(c, i, j), place(c, j, i)];
             }
         }
     }
 
-    /// The first contact of particle `i` with a higher one: those with lower ones have lower numbers.
-    pub(crate) fn own(&self, i: usize) -> u32 {
-        self.own[i]
+    /// Where each contact stands in the row of its lower and in that of its higher particle.
+    pub(crate) fn slots(&self) -> &[[u32; 2]] {
+        &self.slots
     }
 
     /// Number of particles.

@@ -61,8 +61,6 @@ pub struct ContactMatrix {
     value: Vec<f64>,
     /// Where the values of each particle's block begin, of those that have one.
     value_of: Vec<u32>,
-    /// Room for the directions of one block.
-    directions: Vec<Direction>,
     /// Room for [`exchange`](Self::exchange).
     old: (Vec<f64>, Vec<u32>),
     /// The blocks of each contact's lower and higher particle, [`NO_BLOCK`] where it is the only contact.
@@ -187,8 +185,7 @@ impl ContactMatrix {
                     own.copy_from_slice(old);
                 } else {
                     let scale = -packing.radii()[p as usize] * per_radius;
-                    let toward = geometry.toward(p as usize);
-                    fill_block(scale, toward, &mut self.directions, own);
+                    fill_block(scale, geometry.toward(p as usize), own);
                 }
             }
             block += count;
@@ -237,31 +234,26 @@ impl ContactMatrix {
     #[inline(always)]
     fn refresh_here(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
-        let duplicate = geometry.duplicate();
-        let (mut block, mut value, mut contacts) = (0, 0, &self.contact[..]);
+        let (mut block, mut value) = (0, 0);
         for &(z, count) in &self.runs {
             let pairs = z * (z - 1) / 2;
             let particles = &self.particle[block..block + count];
             let values = &mut self.value[value..value + count * pairs];
             (block, value) = (block + count, value + count * pairs);
-            let c;
-            (c, contacts) = contacts.split_at(count * z);
             let blocks = particles.iter().map(|&p| {
                 let p = p as usize;
-                (-packing.radii()[p] * per_radius, duplicate.own(p))
+                (-packing.radii()[p] * per_radius, geometry.toward(p))
             });
             match z {
-                2 => fill::<2, 1>(blocks, c, geometry, values),
-                3 => fill::<3, 3>(blocks, c, geometry, values),
-                4 => fill::<4, 6>(blocks, c, geometry, values),
-                5 => fill::<5, 10>(blocks, c, geometry, values),
-                6 => fill::<6, 15>(blocks, c, geometry, values),
-                7 => fill::<7, 21>(blocks, c, geometry, values),
+                2 => fill::<2, 1>(blocks, values),
+                3 => fill::<3, 3>(blocks, values),
+                4 => fill::<4, 6>(blocks, values),
+                5 => fill::<5, 10>(blocks, values),
+                6 => fill::<6, 15>(blocks, values),
+                7 => fill::<7, 21>(blocks, values),
                 _ => {
-                    let rows = c.chunks_exact(z).zip(values.chunks_exact_mut(pairs));
-                    for ((scale, own), (c, values)) in blocks.zip(rows) {
-                        let toward = c.iter().map(|&c| geometry.direction(c, own));
-                        fill_block(scale, toward, &mut self.directions, values);
+                    for ((scale, toward), values) in blocks.zip(values.chunks_exact_mut(pairs)) {
+                        fill_block(scale, toward, values);
                     }
                 }
             }
@@ -426,44 +418,25 @@ impl ContactMatrix {
     }
 }
 
-const NOWHERE: Direction = Direction {
-    cos: 0.0,
-    sin: 0.0,
-    angle: 0.0,
-};
-
 /// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.
 #[inline(always)]
-fn fill<const Z: usize, const T: usize>(
-    blocks: impl Iterator<Item = (f64, u32)>,
-    contacts: &[u32],
-    geometry: &Geometry,
+fn fill<'a, const Z: usize, const T: usize>(
+    blocks: impl Iterator<Item = (f64, &'a [Direction])>,
     values: &mut [f64],
 ) {
-    let contacts = contacts.as_chunks::<Z>().0;
-    let rows = contacts.iter().zip(values.as_chunks_mut::<T>().0);
-    for ((scale, own), (contacts, values)) in blocks.zip(rows) {
-        let mut toward = [NOWHERE; Z];
-        for (toward, c) in toward.iter_mut().zip(contacts) {
-            *toward = geometry.direction(*c, own);
-        }
-        for b in 1..Z {
-            for a in 0..b {
-                values[b * (b - 1) / 2 + a] = scale * toward[a].g_between(toward[b]);
+    for ((scale, toward), values) in blocks.zip(values.as_chunks_mut::<T>().0) {
+        if let Some(toward) = toward.first_chunk::<Z>() {
+            for b in 1..Z {
+                for a in 0..b {
+                    values[b * (b - 1) / 2 + a] = scale * toward[a].g_between(toward[b]);
+                }
             }
         }
     }
 }
 
 #[inline(always)]
-fn fill_block(
-    scale: f64,
-    directions: impl Iterator<Item = Direction>,
-    toward: &mut Vec<Direction>,
-    values: &mut [f64],
-) {
-    toward.clear();
-    toward.extend(directions);
+fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
     let mut values = values.iter_mut();
     for b in 1..toward.len() {
         for (a, value) in toward[..b].iter().zip(&mut values) {

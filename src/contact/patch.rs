@@ -114,7 +114,7 @@ impl Patch {
         }
         let numbers = whole.geometry.duplicate().contacts(p as usize);
         let at = numbers.iter().position(|&c| c as usize == contact)?;
-        whole.geometry.toward(p as usize).nth(at)
+        Some(whole.geometry.toward(p as usize)[at])
     }
 
     /// Empties the patch; what was exchanged stays.
@@ -157,7 +157,7 @@ impl Patch {
         let first = self.member.len();
         let i = p as usize;
         let own = whole.geometry.duplicate().contacts(i);
-        for (&c, toward) in own.iter().zip(whole.geometry.toward(i)) {
+        for (&c, &toward) in own.iter().zip(whole.geometry.toward(i)) {
             self.join(whole, c as usize, toward);
         }
         for at in self.added_of.partition_point(|a| a[0] < p)..self.added_of.len() {
