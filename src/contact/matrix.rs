@@ -44,7 +44,6 @@ use core::f64::consts::PI;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactMatrix {
     diagonal: Vec<f64>,
-    inverse_diagonal: Vec<f64>,
     /// `A_cc^(−½)`.
     scaling: Vec<f64>,
     /// The largest `A_cc^½`.
@@ -63,8 +62,9 @@ pub struct ContactMatrix {
     value_of: Vec<u32>,
     /// Room for [`exchange`](Self::exchange).
     old: (Vec<f64>, Vec<u32>),
-    /// The blocks of each contact's lower and higher particle, [`NO_BLOCK`] where it is the only contact.
-    ends: Vec<[u32; 2]>,
+    /// The block of each particle, [`NO_BLOCK`] where it has not two contacts.
+    block_of: Vec<u32>,
+    list: ContactList,
 }
 
 /// A particle with one contact couples it to none.
@@ -120,7 +120,6 @@ impl ContactMatrix {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         self.diagonal.resize(contacts.len(), 0.0);
-        self.inverse_diagonal.resize(contacts.len(), 0.0);
         let mut rows = self.diagonal.iter_mut();
         for (i, radius) in radii.iter().enumerate() {
             for (&j, compliance) in contacts.partners(i).iter().zip(&mut rows) {
@@ -129,29 +128,30 @@ impl ContactMatrix {
             }
         }
         self.scaling.resize(contacts.len(), 0.0);
-        let inverses = self.inverse_diagonal.iter_mut().zip(&mut self.scaling);
-        for ((inverse, scaling), compliance) in inverses.zip(&self.diagonal) {
-            *inverse = 1.0 / compliance;
-            *scaling = inverse.sqrt();
-        }
-        self.largest_root = largest_magnitude(&self.diagonal).sqrt();
+        wide(
+            #[inline(always)]
+            || {
+                for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
+                    *scaling = (1.0 / compliance).sqrt();
+                }
+                self.largest_root = largest_magnitude(&self.diagonal).sqrt();
+            },
+        );
         self.sort_blocks(duplicate);
-        self.ends.clear();
-        self.ends.resize(contacts.len(), [NO_BLOCK; 2]);
+        self.list.assign(contacts);
+        self.block_of.clear();
+        self.block_of.resize(radii.len(), NO_BLOCK);
         self.start.clear();
         self.contact.clear();
         self.value_of.resize(radii.len(), 0);
         let mut end = 0;
         for (block, &p) in self.particle.iter().enumerate() {
             let numbers = duplicate.contacts(p as usize);
-            let partners = duplicate.partners(p as usize);
             self.start.push([self.contact.len() as u32, end]);
             self.value_of[p as usize] = end;
             self.contact.extend_from_slice(numbers);
             end += (numbers.len() * (numbers.len() - 1) / 2) as u32;
-            for (&c, &q) in numbers.iter().zip(partners) {
-                self.ends[c as usize][usize::from(q < p)] = block as u32;
-            }
+            self.block_of[p as usize] = block as u32;
         }
         self.start.push([self.contact.len() as u32, end]);
         self.value.resize(end as usize, 0.0);
@@ -293,11 +293,6 @@ impl ContactMatrix {
         &self.diagonal
     }
 
-    /// `1/A_cc`.
-    pub(crate) fn inverse_diagonal(&self) -> &[f64] {
-        &self.inverse_diagonal
-    }
-
     /// `A_cc^(−½)`.
     pub(crate) fn scaling(&self) -> &[f64] {
         &self.scaling
@@ -314,7 +309,8 @@ impl ContactMatrix {
     ///
     /// If there is no row `c`. See the example of [`ContactMatrix`].
     pub fn row(&self, c: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let blocks = self.ends[c].into_iter().filter(|b| *b != NO_BLOCK);
+        let blocks = self.list.pair(c).map(|p| self.block_of[p as usize]);
+        let blocks = blocks.into_iter().filter(|b| *b != NO_BLOCK);
         blocks.flat_map(move |block| {
             let [first, values] = self.start[block as usize].map(|s| s as usize);
             let end = self.start[block as usize + 1][0] as usize;

@@ -170,10 +170,10 @@ impl ConjugateGradient {
         tolerance: f64,
         most: usize,
     ) -> Result<usize, SolverError> {
-        let (diagonal, inverse) = (matrix.diagonal(), matrix.inverse_diagonal());
+        let (diagonal, scaling) = (matrix.diagonal(), matrix.scaling());
         let mut rz = 0.0;
-        for (r, w) in self.residual.iter().zip(inverse) {
-            rz += r * r * w;
+        for (r, s) in self.residual.iter().zip(scaling) {
+            rz += r * r * (s * s);
         }
         self.direction.fill(0.0);
         let mut beta = 0.0;
@@ -182,7 +182,7 @@ impl ConjugateGradient {
                 &mut self.direction,
                 &mut self.image,
                 &self.residual,
-                (diagonal, inverse),
+                (diagonal, scaling),
                 beta,
             );
             matrix.add_off_diagonal(&self.direction, &mut self.image);
@@ -199,7 +199,7 @@ impl ConjugateGradient {
                 forces,
                 &mut self.residual,
                 (&self.direction, &self.image),
-                inverse,
+                scaling,
                 alpha,
             );
             self.largest = largest;
@@ -242,12 +242,12 @@ fn turn(
     direction: &mut [f64],
     image: &mut [f64],
     residual: &[f64],
-    (diagonal, inverse): (&[f64], &[f64]),
+    (diagonal, scaling): (&[f64], &[f64]),
     beta: f64,
 ) {
     let rows = direction.iter_mut().zip(image).zip(residual);
-    for (((p, q), r), (d, w)) in rows.zip(diagonal.iter().zip(inverse)) {
-        *p = r * w + beta * *p;
+    for (((p, q), r), (d, s)) in rows.zip(diagonal.iter().zip(scaling)) {
+        *p = r * (s * s) + beta * *p;
         *q = d * *p;
     }
 }
@@ -258,20 +258,20 @@ fn advance(
     forces: &mut [f64],
     residual: &mut [f64],
     (direction, image): (&[f64], &[f64]),
-    inverse: &[f64],
+    scaling: &[f64],
     alpha: f64,
 ) -> (f64, f64) {
     let (f4, f_rest) = forces.as_chunks_mut::<4>();
     let (r4, r_rest) = residual.as_chunks_mut::<4>();
     let (p4, p_rest) = direction.as_chunks::<4>();
     let (q4, q_rest) = image.as_chunks::<4>();
-    let (w4, w_rest) = inverse.as_chunks::<4>();
+    let (w4, w_rest) = scaling.as_chunks::<4>();
     let (mut sums, mut largest) = ([0.0; 4], [0.0f64; 4]);
     for ((((f, r), p), q), w) in f4.iter_mut().zip(r4).zip(p4).zip(q4).zip(w4) {
         for k in 0..4 {
             f[k] += alpha * p[k];
             r[k] -= alpha * q[k];
-            sums[k] += r[k] * r[k] * w[k];
+            sums[k] += r[k] * r[k] * (w[k] * w[k]);
             let magnitude = r[k].abs();
             largest[k] = if magnitude > largest[k] {
                 magnitude
@@ -285,7 +285,7 @@ fn advance(
     for (((f, r), p), (q, w)) in rows.zip(q_rest.iter().zip(w_rest)) {
         *f += alpha * p;
         *r -= alpha * q;
-        rest += *r * *r * w;
+        rest += *r * *r * (w * w);
         largest_rest = largest_rest.max(r.abs());
     }
     let [a, b, c, d] = largest;
