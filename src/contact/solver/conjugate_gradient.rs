@@ -142,7 +142,11 @@ impl ConjugateGradient {
         wide(
             #[inline(always)]
             || {
-                matrix.multiply_here(forces, image);
+                if forces.iter().all(|f| *f == 0.0) {
+                    image.fill(0.0);
+                } else {
+                    matrix.multiply_here(forces, image);
+                }
                 subtract(residual, overlaps, image)
             },
         )
