@@ -199,3 +199,80 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
     }
     total
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::contact::list::ContactList;
+    use crate::contact::matrix::{ContactMatrix, Geometry};
+    use crate::contact::solver::ConjugateGradient;
+    use crate::domain::{Domain, Vec2};
+    use crate::packing::Packing;
+    use crate::relax::Relaxation;
+    use crate::scene::Scene;
+
+    /// `max |A f − δ|`.
+    fn residual(matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
+        let mut image = vec![0.0; forces.len()];
+        matrix.multiply(forces, &mut image);
+        let differences = image.iter().zip(overlaps).map(|(q, d)| (q - d).abs());
+        differences.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn what_is_left_is_below_the_tolerance_and_below_the_bound() {
+        // Line tensions far outside of what single precision could hold.
+        for (phi, line_tension) in [(0.86, 1.0), (1.0, 1e-90), (1.2, 1e90)] {
+            let scene = Scene {
+                particles: 256,
+                phi,
+                line_tension,
+                ..Scene::default()
+            };
+            let run = Relaxation::new(&scene).unwrap();
+            let (matrix, overlaps) = (run.law().matrix(), run.contacts().overlaps);
+            let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+            for tolerance in [1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13] {
+                let tolerance = tolerance * scale;
+                let mut solver = ConjugateGradient::default();
+                let mut forces = vec![0.0; overlaps.len()];
+                let iterations = solver
+                    .solve_loosely(matrix, overlaps, &mut forces, tolerance)
+                    .unwrap();
+                let left = residual(matrix, overlaps, &forces);
+                assert!(left <= tolerance, "{left:e} after {iterations} iterations");
+                let bound = solver.largest_residual();
+                assert!(left <= bound && bound <= tolerance, "{left:e}, {bound:e}");
+                let mut exact = vec![0.0; overlaps.len()];
+                solver
+                    .solve(matrix, overlaps, &mut exact, tolerance)
+                    .unwrap();
+                assert!(residual(matrix, overlaps, &exact) <= tolerance);
+            }
+        }
+    }
+
+    #[test]
+    fn where_single_precision_is_not_enough_double_is_taken() {
+        // Two neighbours ever closer to one direction: beyond 1e-7 their rows are the same in single precision.
+        for angle in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
+            let at = |r: f64, t: f64| {
+                let (sin, cos) = libm::sincos(t);
+                Vec2::new(4.0 + r * cos, 4.0 + r * sin)
+            };
+            let positions = vec![at(0.0, 0.0), at(0.9, 0.3), at(0.9, 0.3 + angle)];
+            let packing =
+                Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 3], positions).unwrap();
+            let list = ContactList::new(3, &[[0, 1], [0, 2]]).unwrap();
+            let geometry = Geometry::of(&packing, &list);
+            let matrix = ContactMatrix::of(&packing, &list, &geometry, 1.0);
+            let overlaps = [0.1, 0.1 + 0.1 * angle];
+            let mut forces = vec![0.0; 2];
+            let mut solver = ConjugateGradient::default();
+            solver
+                .solve_loosely(&matrix, &overlaps, &mut forces, 1e-9)
+                .unwrap();
+            let left = residual(&matrix, &overlaps, &forces);
+            assert!(left <= 1e-9, "{left:e} at {angle:e}");
+        }
+    }
+}
