@@ -17,10 +17,12 @@ pub(super) fn product<F: Number, const Z: usize, const T: usize>(
     y: &mut [F],
 ) {
     let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
-    for (c, v) in contacts.iter().zip(values) {
+    let x = &x[..y.len()];
+    // Numbers of contacts by value, so that each is checked once.
+    for (&c, v) in contacts.iter().zip(values) {
         let mut at = [F::default(); Z];
         for (at, c) in at.iter_mut().zip(c) {
-            *at = x[*c as usize];
+            *at = x[c as usize];
         }
         let mut sum = [F::default(); Z];
         for b in 1..Z {
@@ -30,8 +32,8 @@ pub(super) fn product<F: Number, const Z: usize, const T: usize>(
                 sum[b] += entry * at[a];
             }
         }
-        for (c, sum) in c.iter().zip(sum) {
-            y[*c as usize] += sum;
+        for (c, sum) in c.into_iter().zip(sum) {
+            y[c as usize] += sum;
         }
     }
 }
