@@ -9,6 +9,7 @@ use crate::force::{backbone, largest_force, mean_coordination};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 use crate::relax::fire::{Fire, FireState};
+use crate::wide::wide;
 use core::f64::consts::PI;
 
 /// When the relaxation of the disks ends.
@@ -79,7 +80,10 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
         neighbors.update_after(packing, 0.0, skin, moved);
-        disk_forces(packing, neighbors.pairs(), line_tension, &mut net);
+        wide(
+            #[inline(always)]
+            || disk_forces(packing, neighbors.pairs(), line_tension, &mut net),
+        );
         let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
@@ -125,6 +129,7 @@ const LANES: usize = 128;
 /// In three passes over a bunch of pairs: separations from scattered positions, forces by columns and without a branch
 /// (which of the candidates touch is nothing that a processor could guess; those that do not give zero), and their sums in
 /// the order of the candidates.
+#[inline(always)]
 fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
     net.fill(Vec2::zeros());
     let (positions, radii) = (packing.positions(), packing.radii());

@@ -78,3 +78,4 @@ pub mod relax;
 pub mod replay;
 pub mod scene;
 mod simplicial;
+mod wide;

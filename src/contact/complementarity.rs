@@ -28,6 +28,7 @@ use super::solver::LinearSolver;
 use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
+use crate::wide::{largest_magnitude, wide};
 use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
@@ -139,6 +140,7 @@ impl ContactLaw {
                 self.matrix
                     .exchange(packing, &self.list, of, &self.exchanged, tension);
                 self.structured = true;
+                self.measure_scale();
                 return;
             }
             self.geometry.restructure(&self.list);
@@ -153,12 +155,19 @@ impl ContactLaw {
         self.matrix
             .refresh(packing, &self.geometry, self.line_tension);
         (self.structured, self.refreshed) = (true, true);
+        self.measure_scale();
     }
 
     /// The largest `|δ|`, the scale of all residuals.
     pub(super) fn scale(&self) -> f64 {
-        let overlaps = self.geometry.overlaps();
-        overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()))
+        self.scale
+    }
+
+    fn measure_scale(&mut self) {
+        self.scale = wide(
+            #[inline(always)]
+            || largest_magnitude(self.geometry.overlaps()),
+        );
     }
 
     /// `max |A f − δ|` of the present forces.
@@ -207,9 +216,10 @@ impl ContactLaw {
     /// A neighbour list that covers bulges up to `largest`.
     pub(super) fn cover(&mut self, packing: &Packing, largest: f64) {
         let skin = 0.3 * packing.largest_radius();
+        let moved = core::mem::replace(&mut self.moved, 0.0);
         if self
             .neighbors
-            .update(packing, 2.0 * largest, skin + largest)
+            .update_after(packing, 2.0 * largest, skin + largest, moved)
         {
             self.parted = false;
         }

@@ -4,6 +4,7 @@ use super::list::{ContactList, DuplicateContactList};
 use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
+use crate::wide::wide;
 use core::f64::consts::PI;
 use core::ops::Range;
 
@@ -33,9 +34,10 @@ pub struct Geometry {
     /// Components of the normals, for the loops of [`refresh`](Self::refresh).
     x: Vec<f64>,
     y: Vec<f64>,
-    /// The directions from the lower particle to the higher, likewise.
-    directions: Vec<Direction>,
-    /// Room for [`exchange`](Self::exchange): as `directions`, of all contacts.
+    /// The angles of the directions from the lower particle to the higher, likewise, and room for their making.
+    angles: Vec<f64>,
+    nodes: Vec<[f64; 2]>,
+    /// Room for [`exchange`](Self::exchange): the directions from the lower particles to the higher.
     lower: Vec<Direction>,
 }
 
@@ -118,6 +120,14 @@ impl Geometry {
     /// Computes everything anew for the positions of `packing`; `contacts` is the list that the structure is of.
     pub(crate) fn refresh(&mut self, packing: &Packing, contacts: &ContactList) {
         assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
+        wide(
+            #[inline(always)]
+            || self.refresh_here(packing, contacts),
+        );
+    }
+
+    #[inline(always)]
+    fn refresh_here(&mut self, packing: &Packing, contacts: &ContactList) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
         let toward = &mut self.toward[..];
@@ -133,7 +143,7 @@ impl Geometry {
             if self.x.len() < count {
                 self.x.resize(count, 0.0);
                 self.y.resize(count, 0.0);
-                self.directions.resize(count, NOWHERE);
+                self.angles.resize(count, 0.0);
             }
             let (x, y) = (&mut self.x[..count], &mut self.y[..count]);
             let distances = &mut self.distances[range.clone()];
@@ -160,26 +170,28 @@ impl Geometry {
             }
             for ((x, y), r) in x.iter_mut().zip(&mut *y).zip(&*distances) {
                 let inverse = 1.0 / r;
-                *x *= inverse;
-                *y *= inverse;
+                // Coincident centres are told apart along x, as in `unit_and_length`.
+                *x = if *r > 0.0 { *x * inverse } else { 1.0 };
+                *y = if *r > 0.0 { *y * inverse } else { 0.0 };
             }
             for (overlap, r) in overlaps.iter_mut().zip(&*distances) {
                 *overlap -= r;
             }
             let normals = &mut self.normals[range.clone()];
-            let directions = &mut self.directions[..count];
-            let rows = normals.iter_mut().zip(&*distances).zip(&mut *directions);
-            for (((normal, r), direction), (x, y)) in rows.zip(x.iter().zip(&*y)) {
-                // Coincident centres are told apart along x, as in `unit_and_length`.
-                *normal = if *r > 0.0 {
-                    Vec2::new(*x, *y)
-                } else {
-                    Vec2::new(1.0, 0.0)
-                };
-                *direction = Direction::with(angles, -*normal);
+            for (normal, (x, y)) in normals.iter_mut().zip(x.iter_mut().zip(&mut *y)) {
+                *normal = Vec2::new(*x, *y);
+                (*x, *y) = (-*x, -*y);
             }
-            for (direction, slots) in directions.iter().zip(&slots[range]) {
-                toward[slots[0] as usize] = *direction;
+            let own = &mut self.angles[..count];
+            angles.of_columns((x, y), &mut self.nodes, own);
+            let slots = &slots[range];
+            for ((slots, angle), (x, y)) in slots.iter().zip(own).zip(x.iter().zip(&*y)) {
+                let direction = Direction {
+                    cos: *x,
+                    sin: *y,
+                    angle: *angle,
+                };
+                toward[slots[0] as usize] = direction;
                 toward[slots[1] as usize] = direction.opposite();
             }
         }

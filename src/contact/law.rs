@@ -85,6 +85,10 @@ pub struct ContactLaw {
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) absurd: Option<(usize, f64)>,
     pub(super) offending: Vec<Offence>,
+    /// How far the particles may have moved since the neighbour list was looked at (length).
+    pub(super) moved: f64,
+    /// The largest `|δ|` of the contacts (length).
+    pub(super) scale: f64,
     /// The largest `|A f − δ|` (length).
     pub(super) off: f64,
     pub(super) residual: f64,
@@ -163,6 +167,8 @@ impl ContactLaw {
             patch: Patch::default(),
             absurd: None,
             offending: Vec::new(),
+            moved: f64::INFINITY,
+            scale: 0.0,
             off: 0.0,
             residual: 0.0,
             work: Work::default(),
@@ -227,7 +233,7 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(pairs, forces);
-        self.refreshed = false;
+        (self.refreshed, self.moved) = (false, f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
@@ -325,16 +331,19 @@ impl ContactLaw {
     /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
     /// ```
     pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
-        self.solve_within(packing, 0.0)
+        self.solve_within(packing, 0.0, f64::INFINITY)
     }
 
-    /// [`solve_again`](Self::solve_again) to the tolerance that is due at `f_max` (units of γ).
+    /// [`solve_again`](Self::solve_again) to the tolerance that is due at `f_max` (units of γ). No particle has moved by more
+    /// than `moved` (length) since the solution before.
     pub(crate) fn solve_within(
         &mut self,
         packing: &Packing,
         f_max: f64,
+        moved: f64,
     ) -> Result<(), ContactError> {
         self.refreshed = false;
+        self.moved += moved;
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {

@@ -107,6 +107,18 @@ impl ContactList {
         &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
     }
 
+    /// Becomes `other`, in the memory that it has.
+    pub(crate) fn assign(&mut self, other: &Self) {
+        self.first.clone_from(&other.first);
+        self.partner.clone_from(&other.partner);
+    }
+
+    /// The pair of contact `c`, in O(log N).
+    pub(crate) fn pair(&self, c: usize) -> [u32; 2] {
+        let lower = self.first.partition_point(|f| *f as usize <= c);
+        [lower.saturating_sub(1) as u32, self.partner[c]]
+    }
+
     /// Number of contacts whose lower particle is in `particles`.
     pub(crate) fn count(&self, particles: core::ops::Range<usize>) -> usize {
         (self.first[particles.end] - self.first[particles.start]) as usize

@@ -3,8 +3,10 @@
 pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
+use super::product::{Number, product, product_of_block, scale, scale_block};
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
+use crate::wide::{largest_magnitude, wide};
 use core::f64::consts::PI;
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
@@ -42,7 +44,10 @@ use core::f64::consts::PI;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactMatrix {
     diagonal: Vec<f64>,
-    inverse_diagonal: Vec<f64>,
+    /// `A_cc^(−½)`.
+    scaling: Vec<f64>,
+    /// The largest `A_cc^½`.
+    largest_root: f64,
     /// The particle of each block.
     particle: Vec<u32>,
     /// Where each block's contacts and values begin, and where the last ends.
@@ -57,8 +62,9 @@ pub struct ContactMatrix {
     value_of: Vec<u32>,
     /// Room for [`exchange`](Self::exchange).
     old: (Vec<f64>, Vec<u32>),
-    /// The blocks of each contact's lower and higher particle, [`NO_BLOCK`] where it is the only contact.
-    ends: Vec<[u32; 2]>,
+    /// The block of each particle, [`NO_BLOCK`] where it has not two contacts.
+    block_of: Vec<u32>,
+    list: ContactList,
 }
 
 /// A particle with one contact couples it to none.
@@ -114,7 +120,6 @@ impl ContactMatrix {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         self.diagonal.resize(contacts.len(), 0.0);
-        self.inverse_diagonal.resize(contacts.len(), 0.0);
         let mut rows = self.diagonal.iter_mut();
         for (i, radius) in radii.iter().enumerate() {
             for (&j, compliance) in contacts.partners(i).iter().zip(&mut rows) {
@@ -122,26 +127,31 @@ impl ContactMatrix {
                 *compliance = -G_AT_CONTACT * per_radius * sum;
             }
         }
-        for (inverse, compliance) in self.inverse_diagonal.iter_mut().zip(&self.diagonal) {
-            *inverse = 1.0 / compliance;
-        }
+        self.scaling.resize(contacts.len(), 0.0);
+        wide(
+            #[inline(always)]
+            || {
+                for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
+                    *scaling = (1.0 / compliance).sqrt();
+                }
+                self.largest_root = largest_magnitude(&self.diagonal).sqrt();
+            },
+        );
         self.sort_blocks(duplicate);
-        self.ends.clear();
-        self.ends.resize(contacts.len(), [NO_BLOCK; 2]);
+        self.list.assign(contacts);
+        self.block_of.clear();
+        self.block_of.resize(radii.len(), NO_BLOCK);
         self.start.clear();
         self.contact.clear();
         self.value_of.resize(radii.len(), 0);
         let mut end = 0;
         for (block, &p) in self.particle.iter().enumerate() {
             let numbers = duplicate.contacts(p as usize);
-            let partners = duplicate.partners(p as usize);
             self.start.push([self.contact.len() as u32, end]);
             self.value_of[p as usize] = end;
             self.contact.extend_from_slice(numbers);
             end += (numbers.len() * (numbers.len() - 1) / 2) as u32;
-            for (&c, &q) in numbers.iter().zip(partners) {
-                self.ends[c as usize][usize::from(q < p)] = block as u32;
-            }
+            self.block_of[p as usize] = block as u32;
         }
         self.start.push([self.contact.len() as u32, end]);
         self.value.resize(end as usize, 0.0);
@@ -215,6 +225,14 @@ impl ContactMatrix {
 
     /// The values, from the directions of the contacts.
     pub(crate) fn refresh(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
+        wide(
+            #[inline(always)]
+            || self.refresh_here(packing, geometry, line_tension),
+        );
+    }
+
+    #[inline(always)]
+    fn refresh_here(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let (mut block, mut value) = (0, 0);
         for &(z, count) in &self.runs {
@@ -275,9 +293,14 @@ impl ContactMatrix {
         &self.diagonal
     }
 
-    /// `1/A_cc`.
-    pub(crate) fn inverse_diagonal(&self) -> &[f64] {
-        &self.inverse_diagonal
+    /// `A_cc^(−½)`.
+    pub(crate) fn scaling(&self) -> &[f64] {
+        &self.scaling
+    }
+
+    /// The largest `A_cc^½`.
+    pub(crate) fn largest_root(&self) -> f64 {
+        self.largest_root
     }
 
     /// The off-diagonal entries of row `c` as `(column, value)`, in no particular order of columns.
@@ -286,7 +309,8 @@ impl ContactMatrix {
     ///
     /// If there is no row `c`. See the example of [`ContactMatrix`].
     pub fn row(&self, c: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let blocks = self.ends[c].into_iter().filter(|b| *b != NO_BLOCK);
+        let blocks = self.list.pair(c).map(|p| self.block_of[p as usize]);
+        let blocks = blocks.into_iter().filter(|b| *b != NO_BLOCK);
         blocks.flat_map(move |block| {
             let [first, values] = self.start[block as usize].map(|s| s as usize);
             let end = self.start[block as usize + 1][0] as usize;
@@ -322,6 +346,15 @@ impl ContactMatrix {
     /// ContactMatrix::default().multiply(&[], &mut []);
     /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        wide(
+            #[inline(always)]
+            || self.multiply_here(x, y),
+        );
+    }
+
+    /// [`multiply`](Self::multiply), to be inlined into loops that are compiled for wide vectors.
+    #[inline(always)]
+    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64]) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
         for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
@@ -331,27 +364,58 @@ impl ContactMatrix {
     }
 
     /// `y += (A − diag A) x`.
+    #[inline(always)]
     pub(crate) fn add_off_diagonal(&self, x: &[f64], y: &mut [f64]) {
-        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
+        self.add_product(&self.value, x, y);
+    }
+
+    /// `y += V x` with other values in the places of the off-diagonal entries: `values` are in their order.
+    #[inline(always)]
+    pub(crate) fn add_product<F: Number>(&self, values: &[F], x: &[F], y: &mut [F]) {
+        let (mut contacts, mut values) = (&self.contact[..], values);
         for &(z, count) in &self.runs {
             let (c, v);
             (c, contacts) = contacts.split_at(count * z);
             (v, values) = values.split_at(count * (z * (z - 1) / 2));
             match z {
-                2 => product::<2, 1>(c, v, x, y),
-                3 => product::<3, 3>(c, v, x, y),
-                4 => product::<4, 6>(c, v, x, y),
-                5 => product::<5, 10>(c, v, x, y),
-                6 => product::<6, 15>(c, v, x, y),
-                7 => product::<7, 21>(c, v, x, y),
+                2 => product::<F, 2, 1>(c, v, x, y),
+                3 => product::<F, 3, 3>(c, v, x, y),
+                4 => product::<F, 4, 6>(c, v, x, y),
+                5 => product::<F, 5, 10>(c, v, x, y),
+                6 => product::<F, 6, 15>(c, v, x, y),
+                7 => product::<F, 7, 21>(c, v, x, y),
                 _ => product_of_block(c, v, x, y),
+            }
+        }
+    }
+
+    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1.
+    #[inline(always)]
+    pub(crate) fn scale_off_diagonal(&self, scaled: &mut Vec<f32>) {
+        scaled.resize(self.value.len(), 0.0);
+        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
+        let mut scaled = &mut scaled[..];
+        for &(z, count) in &self.runs {
+            let (c, v, s);
+            (c, contacts) = contacts.split_at(count * z);
+            (v, values) = values.split_at(count * (z * (z - 1) / 2));
+            (s, scaled) = scaled.split_at_mut(count * (z * (z - 1) / 2));
+            let by = &self.scaling[..];
+            match z {
+                2 => scale::<2, 1>(c, v, by, s),
+                3 => scale::<3, 3>(c, v, by, s),
+                4 => scale::<4, 6>(c, v, by, s),
+                5 => scale::<5, 10>(c, v, by, s),
+                6 => scale::<6, 15>(c, v, by, s),
+                7 => scale::<7, 21>(c, v, by, s),
+                _ => scale_block(c, v, by, s),
             }
         }
     }
 }
 
 /// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.
-#[inline]
+#[inline(always)]
 fn fill<'a, const Z: usize, const T: usize>(
     blocks: impl Iterator<Item = (f64, &'a [Direction])>,
     values: &mut [f64],
@@ -367,50 +431,12 @@ fn fill<'a, const Z: usize, const T: usize>(
     }
 }
 
+#[inline(always)]
 fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
     let mut values = values.iter_mut();
     for b in 1..toward.len() {
         for (a, value) in toward[..b].iter().zip(&mut values) {
             *value = scale * a.g_between(toward[b]);
-        }
-    }
-}
-
-/// `y += A x` of blocks of `Z` contacts.
-#[inline]
-fn product<const Z: usize, const T: usize>(
-    contacts: &[u32],
-    values: &[f64],
-    x: &[f64],
-    y: &mut [f64],
-) {
-    let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
-    for (c, v) in contacts.iter().zip(values) {
-        let mut at = [0.0; Z];
-        for (at, c) in at.iter_mut().zip(c) {
-            *at = x[*c as usize];
-        }
-        let mut sum = [0.0; Z];
-        for b in 1..Z {
-            for a in 0..b {
-                let entry = v[b * (b - 1) / 2 + a];
-                sum[a] += entry * at[b];
-                sum[b] += entry * at[a];
-            }
-        }
-        for (c, sum) in c.iter().zip(sum) {
-            y[*c as usize] += sum;
-        }
-    }
-}
-
-/// `y += A x` of one block of any size.
-fn product_of_block(contacts: &[u32], values: &[f64], x: &[f64], y: &mut [f64]) {
-    let mut values = values.iter();
-    for (b, &cb) in contacts.iter().enumerate() {
-        for (&ca, entry) in contacts[..b].iter().zip(&mut values) {
-            y[ca as usize] += entry * x[cb as usize];
-            y[cb as usize] += entry * x[ca as usize];
         }
     }
 }

@@ -29,6 +29,7 @@ pub mod list;
 pub mod matrix;
 mod mend;
 mod patch;
+pub(crate) mod product;
 pub mod solver;
 mod tolerance;
 

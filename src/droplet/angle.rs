@@ -23,9 +23,6 @@ static TABLE: LazyLock<[[f64; 2]; 64]> = LazyLock::new(|| {
     })
 });
 
-/// The angle in the upper half plane is `turn + sign φ`: by whether `cos < 0` and whether `|sin| > |cos|`.
-const OCTANTS: [[f64; 2]; 4] = [[0.0, 1.0], [FRAC_PI_2, -1.0], [PI, -1.0], [FRAC_PI_2, 1.0]];
-
 /// What angles are computed with; to be had once for many of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Angles(&'static [[f64; 2]; 64]);
@@ -36,20 +33,61 @@ impl Angles {
     }
 
     /// The angle of a *unit* vector to the x axis, in `[−π, π]` (radians); its error is below 9e-16.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(self, unit: Vec2) -> f64 {
-        let (x, y) = (unit.x.abs(), unit.y.abs());
-        let (a, b) = (x.min(y), x.max(y));
-        // A conversion saturates, and sends NaN to 0.
-        let k = (64.0 * a + 0.5) as i32 & 63;
-        let [cos, angle] = self.0[k as usize];
-        let sine = a * cos - b * (f64::from(k) * (1.0 / 64.0));
-        let s = sine * sine;
-        let phi = angle + (sine + sine * s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (5.0 / 112.0))));
-        let octant = 2 * usize::from(unit.x < 0.0) + usize::from(y > x);
-        let [turn, sign] = OCTANTS[octant];
-        (turn + sign * phi).copysign(unit.y)
+        from_node(unit.x, unit.y, self.node(unit.x, unit.y))
     }
+
+    /// The angles of unit vectors by their components; `nodes` is room. All slices have one length.
+    ///
+    /// In three passes, since what is read from the table stands in the way of computing several angles at a time.
+    #[inline(always)]
+    pub(crate) fn of_columns(
+        self,
+        (x, y): (&[f64], &[f64]),
+        nodes: &mut Vec<[f64; 2]>,
+        angles: &mut [f64],
+    ) {
+        for ((k, x), y) in angles.iter_mut().zip(x).zip(y) {
+            *k = f64::from_bits(place(*x, *y));
+        }
+        nodes.clear();
+        nodes.extend(angles.iter().map(|k| self.0[(k.to_bits() & 63) as usize]));
+        for ((angle, node), (x, y)) in angles.iter_mut().zip(&*nodes).zip(x.iter().zip(y)) {
+            *angle = from_node(*x, *y, *node);
+        }
+    }
+
+    #[inline(always)]
+    fn node(self, x: f64, y: f64) -> [f64; 2] {
+        self.0[(place(x, y) & 63) as usize]
+    }
+}
+
+/// 1.5·2⁵²: a small number added to it is rounded to a whole one, which stands in the last bits of the sum.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// The number of the node nearest to the smaller component, in the last six bits.
+#[inline(always)]
+fn place(x: f64, y: f64) -> u64 {
+    (64.0 * x.abs().min(y.abs()) + ROUND).to_bits()
+}
+
+/// The angle, from the node's cosine and angle.
+#[inline(always)]
+fn from_node(x: f64, y: f64, [cos, angle]: [f64; 2]) -> f64 {
+    let (right, up) = (x.abs(), y.abs());
+    let (a, b) = (right.min(up), right.max(up));
+    let k = (64.0 * a + ROUND) - ROUND;
+    let sine = a * cos - b * (k * (1.0 / 64.0));
+    let s = sine * sine;
+    let phi = angle + (sine + sine * s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (5.0 / 112.0))));
+    // In the upper half plane the angle is φ, π/2 − φ, π/2 + φ or π − φ. Selections instead of branches.
+    let turn = if x < 0.0 { PI } else { 0.0 };
+    let turn = if up > right { FRAC_PI_2 } else { turn };
+    let sign = if x < 0.0 { -1.0 } else { 1.0 };
+    let sign = if up > right { -sign } else { sign };
+    (turn + sign * phi).copysign(y)
 }
 
 #[cfg(test)]
@@ -60,12 +98,20 @@ mod tests {
     fn angles_are_those_of_atan2() {
         let angles = Angles::new();
         let mut worst: f64 = 0.0;
+        let (mut columns, mut one_by_one) = ((Vec::new(), Vec::new()), Vec::new());
         for k in 0..400_000 {
             let angle = (f64::from(k) / 200_000.0 - 1.0) * PI;
             let (sin, cos) = libm::sincos(angle);
-            worst = worst.max((angles.of(Vec2::new(cos, sin)) - libm::atan2(sin, cos)).abs());
+            let of = angles.of(Vec2::new(cos, sin));
+            worst = worst.max((of - libm::atan2(sin, cos)).abs());
+            columns.0.push(cos);
+            columns.1.push(sin);
+            one_by_one.push(of);
         }
         assert!(worst < 9e-16, "{worst:e}");
+        let mut together = vec![0.0; one_by_one.len()];
+        angles.of_columns((&columns.0, &columns.1), &mut Vec::new(), &mut together);
+        assert_eq!(together, one_by_one);
         for (x, y, angle) in [
             (1.0, 0.0, 0.0),
             (0.0, 1.0, FRAC_PI_2),

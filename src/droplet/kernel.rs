@@ -130,7 +130,7 @@ impl Direction {
     }
 
     /// [`of`](Self::of), for many of them.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn with(angles: Angles, unit: crate::domain::Vec2) -> Self {
         Self {
             cos: unit.x,
@@ -147,7 +147,7 @@ impl Direction {
     /// assert_eq!((west.cos, west.angle), (-1.0, std::f64::consts::PI));
     /// ```
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn opposite(self) -> Self {
         Self {
             cos: -self.cos,
@@ -172,7 +172,7 @@ impl Direction {
     /// assert_eq!(a.g_between(a), -1.5);
     /// ```
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn g_between(self, other: Self) -> f64 {
         let difference = self.angle - other.angle; // in [−2π, 2π]
         let cross = self.sin * other.cos - self.cos * other.sin; // sine of the difference

@@ -58,6 +58,7 @@ pub use form::{Form, NetForces};
 
 use crate::contact::Contacts;
 use crate::domain::{Domain, Vec2};
+use crate::wide::wide;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
 ///
@@ -135,11 +136,16 @@ pub fn largest_force(net: &[Vec2]) -> f64 {
     // A NaN must not hide behind a comparison.
     let larger = |m: f64, s: f64| if s <= m { m } else { s };
     let mut most = [0.0; 4];
-    for f in net4 {
-        for k in 0..4 {
-            most[k] = larger(most[k], f[k].norm_squared());
-        }
-    }
+    wide(
+        #[inline(always)]
+        || {
+            for f in net4 {
+                for k in 0..4 {
+                    most[k] = larger(most[k], f[k].norm_squared());
+                }
+            }
+        },
+    );
     let squared = most.into_iter().fold(0.0, larger);
     let squared = rest.iter().map(Vec2::norm_squared).fold(squared, larger);
     squared.sqrt()

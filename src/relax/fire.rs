@@ -6,6 +6,7 @@
 
 use super::newton::Turns;
 use crate::domain::{Domain, Vec2};
+use crate::wide::wide;
 
 /// FIRE's parameters; the defaults are those of the paper.
 ///
@@ -219,6 +220,21 @@ impl Fire {
         positions: &mut [Vec2],
         domain: Domain,
     ) {
+        wide(
+            #[inline(always)]
+            || self.advance_here(state, forces, velocities, positions, domain),
+        );
+    }
+
+    #[inline(always)]
+    fn advance_here(
+        &self,
+        state: &mut FireState,
+        forces: &[Vec2],
+        velocities: &mut [Vec2],
+        positions: &mut [Vec2],
+        domain: Domain,
+    ) {
         let power = power(forces, velocities);
         let mut back = 0.0;
         if power > 0.0 {
@@ -266,6 +282,7 @@ impl Fire {
 }
 
 /// `P = F·v`, summed in one fixed order, four particles wide.
+#[inline(always)]
 fn power(forces: &[Vec2], velocities: &[Vec2]) -> f64 {
     let (f4, f_rest) = forces.as_chunks::<4>();
     let (v4, v_rest) = velocities.as_chunks::<4>();

@@ -211,7 +211,9 @@ impl Relaxation {
         // A NaN is thrown too.
         let within = |v: &Vec2| (v * dt).norm_squared() <= far * far;
         let thrown = |v: &Vec2| !within(v);
-        if let Some(particle) = self.velocities.iter().position(thrown) {
+        let farthest = largest_force(&self.velocities) * dt;
+        let near = farthest <= 0.99 * far;
+        if !near && let Some(particle) = self.velocities.iter().position(thrown) {
             self.failed = true;
             return Err(RelaxError::TooFar {
                 step: self.step,
@@ -221,7 +223,13 @@ impl Relaxation {
                 dt_max: self.state.dt_max,
             });
         }
-        if let Err(source) = self.solve() {
+        // A step uphill goes back first.
+        let moved = if self.state.downhill > 0 {
+            farthest
+        } else {
+            f64::INFINITY
+        };
+        if let Err(source) = self.solve(moved) {
             self.failed = true;
             let step = self.step;
             return Err(RelaxError::Contact { step, source });
@@ -270,9 +278,11 @@ impl Relaxation {
     ///
     /// The tolerance at first is that of the frame before; it is a function of that frame, so a run that is taken up there
     /// takes the same way.
-    fn solve(&mut self) -> Result<(), ContactError> {
+    ///
+    /// No particle has moved by more than `moved` (length) since the last solution.
+    fn solve(&mut self, moved: f64) -> Result<(), ContactError> {
         let mut due = self.due(self.f_max);
-        self.law.solve_within(&self.packing, due)?;
+        self.law.solve_within(&self.packing, due, moved)?;
         self.balance();
         // The full tolerance, due at 0, keeps every promise; a frame that might be the last is always solved to it.
         while due > 0.0

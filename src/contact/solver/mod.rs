@@ -7,6 +7,7 @@
 mod cholesky;
 mod conjugate_gradient;
 mod gauss_jordan;
+mod single;
 
 pub use cholesky::SparseCholesky;
 pub use conjugate_gradient::ConjugateGradient;

@@ -3,6 +3,8 @@
 //! Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 856 (1986): modified Gram–Schmidt, Givens rotations, no
 //! restart. The residual that is minimised is the true one, `|b − J x|`.
 
+use crate::wide::wide;
+
 /// The part of the tolerance that the products may use up, and the least accuracy of a product.
 const SHARE: f64 = 0.1;
 const LOOSEST: f64 = 0.05;
@@ -133,11 +135,16 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();
     let mut sums = [0.0; 8];
-    for (x, y) in a8.iter().zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
+    wide(
+        #[inline(always)]
+        || {
+            for (x, y) in a8.iter().zip(b8) {
+                for k in 0..8 {
+                    sums[k] += x[k] * y[k];
+                }
+            }
+        },
+    );
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
     let pairs = [
         sums[0] + sums[4],
@@ -153,7 +160,12 @@ pub(super) fn norm(a: &[f64]) -> f64 {
 }
 
 fn axpy(k: f64, x: &[f64], y: &mut [f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += k * x;
-    }
+    wide(
+        #[inline(always)]
+        || {
+            for (y, x) in y.iter_mut().zip(x) {
+                *y += k * x;
+            }
+        },
+    );
 }

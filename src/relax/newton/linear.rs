@@ -94,9 +94,13 @@ impl At<'_> {
         }
         b.change.clear();
         b.change.resize(b.right.len(), 0.0);
-        b.solver
-            .solve(self.matrix, &b.right, &mut b.change, tolerance * largest)
-            .is_ok()
+        solve(
+            &mut b.solver,
+            self.matrix,
+            (&b.right, &mut b.change),
+            tolerance,
+            largest,
+        )
     }
 
     /// The `df` that [`forces`](Self::forces) found last.
@@ -145,8 +149,7 @@ impl At<'_> {
         }
         miss.clear();
         miss.resize(forces.len(), 0.0);
-        let solved = b.solver.solve(self.matrix, &b.right, miss, 1e-3 * largest);
-        if solved.is_err() {
+        if !solve(&mut b.solver, self.matrix, (&b.right, miss), 1e-3, largest) {
             return false;
         }
         b.along.clear();
@@ -175,6 +178,25 @@ impl At<'_> {
         }
     }
 }
+
+/// `A x = b` from the guess in `x`, right to `tolerance` times the `largest` entry of `b`; `false` if that cannot be had.
+fn solve(
+    solver: &mut ConjugateGradient,
+    matrix: &ContactMatrix,
+    (b, x): (&[f64], &mut [f64]),
+    tolerance: f64,
+    largest: f64,
+) -> bool {
+    let solved = if tolerance >= FAR_ABOVE_ROUND_OFF {
+        solver.solve_loosely(matrix, b, x, tolerance * largest)
+    } else {
+        solver.solve(matrix, b, x, tolerance * largest)
+    };
+    solved.is_ok()
+}
+
+/// A tolerance at which the residual need not be computed anew from the solution.
+const FAR_ABOVE_ROUND_OFF: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

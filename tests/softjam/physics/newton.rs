@@ -20,21 +20,28 @@ fn finishing(particles: usize, phi: f64, seed: u64) -> Scene {
     }
 }
 
-/// Steps, steps of Newton's method that were kept and attempts given up.
-#[derive(Default, Debug)]
+/// Steps, steps of Newton's method that were kept and attempts given up, and the lowest `f_max` on the way.
+#[derive(Debug)]
 struct Count {
     steps: u64,
     kept: u32,
     given_up: u32,
+    lowest: f64,
 }
 
 /// A run to its end, whatever that is.
 fn run_to_the_end(scene: &Scene) -> (Relaxation, Count) {
     let mut run = Relaxation::new(scene).unwrap();
-    let mut count = Count::default();
+    let mut count = Count {
+        steps: 0,
+        kept: 0,
+        given_up: 0,
+        lowest: run.f_max(),
+    };
     let mut before = Turns::default();
     while run.status() == Status::Running {
         run.advance().unwrap();
+        count.lowest = count.lowest.min(run.f_max());
         let turns = run.frame().minimizer.turns;
         if turns.failures > before.failures || (turns.failures == 1 && turns.wait > before.wait) {
             count.given_up += 1;
@@ -349,6 +356,7 @@ fn a_threshold_out_of_reach_ends_at_the_step_limit() {
     });
     assert_eq!(run.status(), Status::StepLimit);
     assert_eq!(run.step(), 3000);
-    assert!(run.f_max() < 1e-12);
+    // The last frame is one of many at the level of round-off, whose f_max goes up and down by a factor of ten.
+    assert!(count.lowest < 5e-13, "{count:?}");
     assert!((1..=20).contains(&count.given_up), "{count:?}");
 }
