@@ -1,8 +1,9 @@
-//! The seed's figure 5: a packing of undeformed disks, and the deformable particles that relax from it.
+//! The seed's figure 5: a packing of undeformed disks (a), and the deformable particles that relax from it (b).
 //!
-//! `cargo run --release --example figure5 [FOLDER]` writes `figure5a.svg` and `figure5b.svg`.
+//! `cargo run --release --example figure5 -- [FOLDER]` writes `figure5a.svg` and `figure5b.svg`. The disks of (a) overlap where
+//! they touch; the particles of (b) give way to each other.
 
-use softjam::figure::{Shape, Style, packing, write};
+use softjam::figure::{ColorBy, Shape, Style, packing, write};
 use softjam::relax::{Relaxation, Status};
 use softjam::scene::Scene;
 use std::error::Error;
@@ -11,17 +12,22 @@ use std::path::PathBuf;
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or(".".to_owned()));
     let scene = Scene {
-        particles: 200,
-        phi: 0.92,
-        seed: 3,
+        particles: 100,
+        phi: 0.9,
+        seed: 1,
         ..Scene::default()
+    };
+    let plain = Style {
+        color: ColorBy::Nothing,
+        chains: false,
+        ..Style::default()
     };
     let mut run = Relaxation::new(&scene)?;
 
     // (a) Frame 0: the disks are in balance, the Morse–Witten forces are not.
     let disks = Style {
         shape: Shape::Disk,
-        ..Style::default()
+        ..plain
     };
     let a = packing(run.packing(), &run.frame(), scene.line_tension, &disks);
     write(folder.join("figure5a.svg"), &a)?;
@@ -30,12 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     while run.status() == Status::Running {
         run.advance()?;
     }
-    let b = packing(
-        run.packing(),
-        &run.frame(),
-        scene.line_tension,
-        &Style::default(),
-    );
+    let b = packing(run.packing(), &run.frame(), scene.line_tension, &plain);
     write(folder.join("figure5b.svg"), &b)?;
     Ok(())
 }

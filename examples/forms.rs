@@ -1,6 +1,6 @@
 //! How far apart the packings of the two force forms lie: the same starts relaxed with central and with gradient forces.
 //!
-//! `cargo run --release --example forms` prints a line a coverage, medians over the seeds: root mean square and largest
+//! `cargo run --release --example forms -- [SEEDS]` prints a line a coverage, medians over the seeds: root mean square and largest
 //! displacement between the two packings (rattlers left out, the common translation taken off), the same two from the
 //! central packing relaxed on with gradient forces, the relative differences of energy and pressure (gradient over central,
 //! less one) and the coordination numbers.
@@ -11,16 +11,16 @@ use softjam::domain::Vec2;
 use softjam::force::Form;
 use softjam::relax::{RelaxError, Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
+use std::error::Error;
 
-const SEEDS: u64 = 15;
-
-fn main() -> Result<(), RelaxError> {
+fn main() -> Result<(), Box<dyn Error>> {
+    let seeds: u64 = std::env::args().nth(1).map_or(Ok(15), |n| n.parse())?;
     println!(
         "phi,seeds,rms,largest,rms_onward,largest_onward,energy,pressure,z_central,z_gradient"
     );
     for phi in [0.86, 0.90, 0.95, 1.0] {
         let mut columns: [Vec<f64>; 8] = Default::default();
-        for seed in 1..=SEEDS {
+        for seed in 1..=seeds {
             let start = Relaxation::new(&scene(phi, seed, Form::Central))?;
             let central = relaxed(start)?;
             let start = Relaxation::new(&scene(phi, seed, Form::Gradient))?;
@@ -49,7 +49,7 @@ fn main() -> Result<(), RelaxError> {
             .into_iter()
             .map(|c| format!("{:.3e}", median(c)))
             .collect();
-        println!("{phi},{SEEDS},{}", row.join(","));
+        println!("{phi},{seeds},{}", row.join(","));
     }
     Ok(())
 }

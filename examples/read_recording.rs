@@ -1,12 +1,13 @@
 //! Reads a recording, `.rrd` or `.mcap`: the fall of `f_max`, and the distribution of forces in its last state.
 //!
 //! ```text
-//! cargo run --release --example read_recording -- recordings/jammed.rrd [BITS]
+//! cargo run --release --example read_recording -- recordings/jammed.rrd [FORCES.svg [BITS]]
 //! ```
 //!
-//! With a second file name it writes every number that it reads there as little-endian bytes, in the order of
+//! `FORCES.svg` is a picture of that distribution (`-` for none). With a third file name it writes every number that it reads there as little-endian bytes, in the order of
 //! `examples/python/plot.py`, so that readers in other languages can be compared with this one.
 
+use softjam::figure::{Axis, Curve, Mark, Scale, chart, write};
 use softjam::force::METRICS;
 use softjam::replay::{Event, Recording};
 use std::collections::BTreeMap;
@@ -49,6 +50,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (step, row) in metrics.iter().step_by(every) {
         writeln!(out, "{step:8}  {:.3e}", row[0])?;
     }
+    let mut distribution = Curve {
+        label: path,
+        mark: Mark::Dots,
+        ..Curve::default()
+    };
     if let Some(last) = states.last().filter(|last| !last.forces.is_empty()) {
         let mean = last.forces.iter().sum::<f64>() / last.forces.len() as f64;
         writeln!(
@@ -56,13 +62,25 @@ fn main() -> Result<(), Box<dyn Error>> {
             "\n  f/<f>   share of the contacts at step {}",
             last.step
         )?;
-        for bin in 0..8 {
-            let (from, to) = (f64::from(bin) / 2.0, f64::from(bin + 1) / 2.0);
+        let width = 0.25;
+        for bin in 0..16 {
+            let (from, to) = (width * f64::from(bin), width * f64::from(bin + 1));
             let within = |f: &&f64| (from..to).contains(&(**f / mean));
             let share = last.forces.iter().filter(within).count() as f64 / last.forces.len() as f64;
             let bar = "#".repeat((100.0 * share).round() as usize);
-            writeln!(out, "{from:.1}-{to:.1}  {share:6.3} {bar}")?;
+            writeln!(out, "{from:.2}-{to:.2}  {share:7.4} {bar}")?;
+            let density = share / width;
+            distribution.points.push((0.5 * (from + to), density));
         }
+    }
+    // `-` draws nothing.
+    if let Some(picture) = arguments.next().filter(|name| name != "-") {
+        let axis = |title: &str| Axis {
+            title: title.to_owned(),
+            scale: Scale::Linear,
+        };
+        let (x, y) = (axis("f / ⟨f⟩"), axis("probability density"));
+        write(picture, &chart(&x, &y, &[distribution])?)?;
     }
 
     if let Some(path) = arguments.next() {

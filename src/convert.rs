@@ -25,6 +25,7 @@
 //! ```
 
 use crate::domain::Vec2;
+use crate::force::Backbone;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::record::{Header, Outcome, RecordError, Snapshot, Writer, Written, nanoseconds};
@@ -47,6 +48,12 @@ pub struct Converted {
 }
 
 /// Why a recording cannot be converted.
+///
+/// ```
+/// use softjam::convert::ConvertError;
+/// let error = ConvertError::NoState { path: "run.rrd".to_owned() };
+/// assert!(error.to_string().contains("only its metrics can be converted"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConvertError {
@@ -257,13 +264,14 @@ impl Conversion {
         let start = from.step;
         let packing = recording.packing(&from)?;
         let mut run = Relaxation::resume(recording.scene(), packing, from)?;
+        let mut backbone = Backbone::default();
         loop {
             run.advance()?;
             if run.step() == to.step {
                 break;
             }
             self.rebuilt += 1;
-            if let Some(snapshot) = Snapshot::of(&run, &self.channels, false) {
+            if let Some(snapshot) = Snapshot::counted(&run, &self.channels, false, &mut backbone) {
                 self.writer.send(snapshot)?;
             }
         }

@@ -39,6 +39,12 @@ pub struct Frame {
 }
 
 /// Why a frame cannot belong to a packing of the given size and box.
+///
+/// ```
+/// use softjam::{domain::Domain, frame::Frame};
+/// let error = Frame::default().validate(2, Domain::new(8.0, 8.0).unwrap()).unwrap_err();
+/// assert!(error.to_string().contains('2'), "{error}");
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {

@@ -20,23 +20,10 @@
 //!
 //! # The model
 //!
-//! A particle `i` of undeformed radius `R_i` is a droplet with line tension `γ`. Its contour, in polar coordinates about
-//! its centre, is the circle plus one copy of a kernel `g` for each contact force, Saitoh (1)–(3):
-//!
-//! ```text
-//! ρ_i(θ) = R_i + ΔR_i(θ),    ΔR_i(θ) = (R_i / 2πγ) Σ_j f_ij g(θ − θ_j)
-//! g(θ) = (π − θ) sin θ − ½ cos θ − 1    (0 ≤ θ ≤ 2π)
-//! ```
-//!
-//! Two particles in contact share a point of their contours, which couples all contacts to one linear system for the
-//! force magnitudes, Saitoh (4)–(6), with the overlaps of the undeformed disks `δ_ij = R_i + R_j − r_ij`:
-//!
-//! ```text
-//! A f = δ,    A_cc' = −Σ_p (R_p / 2πγ) g(angle between c and c' at p),    A_cc = (3 / 4πγ)(R_i + R_j)
-//! ```
-//!
-//! Which pairs touch follows from `f ≥ 0`, `gap ≥ 0`, `f · gap = 0`. The forces act along the lines of centres, and FIRE
-//! moves the particles until no net force is larger than the threshold; Newton's method can finish.
+//! A particle is a droplet: each contact force dents its contour and lets it bulge elsewhere. Two particles in contact share a
+//! point of their contours, which couples all contact forces to one linear system; which pairs touch follows from forces that
+//! push and contours that do not overlap. FIRE moves the particles until no net force is larger than the threshold;
+//! Newton's method can finish. The page [`model`] has it all, in the order of the paper, with its formulas.
 //!
 //! # Units
 //!
@@ -47,6 +34,7 @@
 //!
 //! | | |
 //! | --- | --- |
+//! | [`model`] | the physics, formula by formula: nothing but text |
 //! | [`scene`] | what a run depends on: TOML, defaults, ranges, first packings |
 //! | [`domain`], [`packing`], [`neighbors`] | periodic box, positions and radii, candidate pairs |
 //! | [`disks`] | the undeformed packing that a run starts from |
@@ -79,6 +67,8 @@ pub mod droplet;
 pub mod figure;
 pub mod force;
 pub mod frame;
+#[doc = include_str!("model.md")]
+pub mod model {}
 pub mod neighbors;
 pub mod packing;
 #[cfg(feature = "recording")]

@@ -33,6 +33,13 @@ pub struct Packing {
 }
 
 /// Why a packing cannot be made.
+///
+/// ```
+/// use softjam::{domain::{Domain, Vec2}, packing::{Packing, PackingError}};
+/// let domain = Domain::new(8.0, 8.0).unwrap();
+/// let error = Packing::new(domain, vec![-0.5], vec![Vec2::new(1.0, 1.0)]).unwrap_err();
+/// assert!(error.to_string().contains("-0.5"), "{error}");
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackingError {

@@ -19,7 +19,10 @@ Examples:
                                                             everything else, rebuilt from it
   softjam convert run.rrd fine.rrd --channels state,metrics,contours=every:1
                                                             steps that run.rrd lacks are computed again
-States, metrics, scene and result go over as they are; contours and contacts are drawn anew from the states.")]
+States, metrics, scene and result go over as they are; contours and contacts are drawn anew from the states.
+
+Exit codes: 0 converted, 1 could not be done, or the recording is damaged or breaks off (what came before is converted), 2 the
+request makes no sense")]
 pub struct Arguments {
     /// The recording to convert, .rrd or .mcap.
     #[arg(value_name = "IN")]

@@ -4,6 +4,7 @@ use super::{Verdict, print};
 use softjam::figure::{self, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -13,7 +14,12 @@ Examples:
   softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
   softjam figure run.rrd --step 0 --disks -o disks.png    the undeformed disks of step 0
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
-  softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run")]
+  softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
+  softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
+  softjam figure run.rrd --color nothing --no-chains -o figure5b.svg                       and 5(b)
+
+Exit codes: 0 drawn, 1 could not be done (a damaged file, a folder that is not there), 2 the request makes no sense (a step that is
+not recorded, a file that is in the way)")]
 pub struct Arguments {
     /// The recording, .rrd or .mcap; with --fmax, as many as there are curves.
     #[arg(value_name = "RUN.rrd", required = true)]
@@ -23,7 +29,7 @@ pub struct Arguments {
     #[arg(long, short, value_name = "FIGURE.svg")]
     output: PathBuf,
 
-    /// Draw f_max against step instead of a packing.
+    /// Draw f_max (units of γ) against step instead of a packing, with the thresholds as dashed lines.
     #[arg(long, conflicts_with_all = ["step", "disks", "color", "no_chains"])]
     fmax: bool,
 
@@ -31,15 +37,15 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value = "last", value_parser = step)]
     step: Step,
 
-    /// Draw the undeformed disks instead of the contours.
+    /// Draw the undeformed disks of the step instead of the contours.
     #[arg(long)]
     disks: bool,
 
-    /// What the colour of a particle means: pressure, deformation or nothing.
+    /// What the colour of a particle means: pressure (Σf/2πR relative to its mean), deformation (max |ΔR|/R) or nothing.
     #[arg(long, value_name = "QUANTITY", default_value = "pressure", value_parser = super::flags::named::<ColorBy>)]
     color: ColorBy,
 
-    /// Leave the force chains out.
+    /// Leave out the force chains: lines between centres, as wide as the force.
     #[arg(long)]
     no_chains: bool,
 
@@ -71,7 +77,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     super::output::Output::named(output).check(&inputs, arguments.force)?;
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path));
-        figure::relaxation(&named(&runs.collect::<anyhow::Result<Vec<_>>>()?))?
+        figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
     } else {
         let [path] = arguments.files.as_slice() else {
             return Err(FigureError::Nothing(
@@ -89,26 +95,33 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 /// What tells runs apart: coverage, number of particles, seed.
 type Names = [String; 3];
 
-/// Each curve is called by what is not the same in all of them, or by its coverage.
-fn named(runs: &[(Names, Vec<(u64, f64)>)]) -> Vec<Fall> {
+/// Names beyond this number cannot be told apart by their colours.
+const COLORS: usize = 6;
+
+/// Each curve is called by its coverage and by what else is not the same in all of them; samples of one coverage share
+/// a name, and with it a colour, where there would be too many.
+fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
-    let shown: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
-    let label = |names: &Names| {
-        shown
-            .iter()
-            .map(|k| names[*k].as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
+    let all: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
+    let label = |names: &Names, shown: &[usize]| {
+        let shown = shown.iter().map(|k| names[*k].as_str());
+        shown.collect::<Vec<_>>().join(", ")
     };
-    runs.iter()
-        .map(|(names, points)| Fall {
-            label: label(names),
-            points: points.clone(),
-        })
-        .collect()
+    let distinct: BTreeSet<String> = runs.iter().map(|(names, _)| label(names, &all)).collect();
+    let without_seed: Vec<usize> = all.iter().copied().filter(|k| *k != 2).collect();
+    let shown = if distinct.len() > COLORS {
+        without_seed
+    } else {
+        all
+    };
+    let named = |(names, fall): (Names, Fall)| Fall {
+        label: label(&names, &shown),
+        ..fall
+    };
+    runs.into_iter().map(named).collect()
 }
 
-fn fall(path: &Path) -> anyhow::Result<(Names, Vec<(u64, f64)>)> {
+fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
     let mut recording = Recording::open(path)?;
     let mut points = Vec::new();
     for event in recording.by_ref() {
@@ -133,15 +146,22 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Vec<(u64, f64)>)> {
         format!("N = {}", recording.radii().len()),
         format!("seed {}", recording.scene().seed),
     ];
-    Ok((names, points))
+    let fall = Fall {
+        label: String::new(),
+        points,
+        threshold: Some(recording.scene().threshold),
+    };
+    Ok((names, fall))
 }
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let mut recording = Recording::open(path)?;
     let mut found: Option<Frame> = None;
+    let mut states = 0;
     for event in recording.by_ref() {
         if let Event::State(frame) = event? {
             let at = frame.step;
+            states += 1;
             if matches!(arguments.step, Step::Number(k) if at > k) {
                 break;
             }
@@ -150,7 +170,12 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     }
     let shown = path.display();
     let frame = match (found, arguments.step) {
-        (None, _) => Err(format!("{shown} holds no state to draw")),
+        (None, Step::Number(k)) if states > 0 => Err(format!(
+            "{shown} holds no state of step {k}, nor one before it"
+        )),
+        (None, _) => Err(format!(
+            "{shown} holds no state to draw; record it with --channels state,…"
+        )),
         (Some(frame), Step::Number(k)) if frame.step != k => Err(format!(
             "{shown} holds no state of step {k}; the nearest before it is {}. `softjam convert` with \
              --channels state=every:1 brings it back",

@@ -7,70 +7,74 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct SceneFlags {
-    /// Scene file (TOML); see `softjam scene`. Without it, the default scene.
+    /// Scene file (TOML), in which each of these flags has a field; flags win over it. `softjam scene` prints one. Without
+    /// it, the default scene.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
 
-    /// Number of particles N.
-    #[arg(long, short = 'N', value_name = "N", allow_negative_numbers = true, help_heading = PACKING)]
+    /// Number of particles N, 1 … 10000000 [default: 256].
+    #[arg(long, short = 'N', value_name = "N", value_parser = whole, allow_negative_numbers = true, help_heading = PACKING)]
     particles: Option<i128>,
 
-    /// Coverage φ of the undeformed disks, 0 < φ < 1.3.
-    #[arg(long, value_name = "PHI", allow_negative_numbers = true, help_heading = PACKING)]
+    /// Coverage φ = Σ πR² / (L_x L_y) of the undeformed disks, 0 < φ < 1.3 [default: 0.86].
+    #[arg(long, value_name = "PHI", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
     phi: Option<f64>,
 
-    /// Aspect L_x / L_y of the periodic box.
-    #[arg(long, value_name = "RATIO", allow_negative_numbers = true, help_heading = PACKING)]
+    /// Aspect L_x / L_y of the periodic box, 0.1 … 10 [default: 1].
+    #[arg(long, value_name = "RATIO", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
     aspect: Option<f64>,
 
-    /// Seed of the random start.
-    #[arg(long, short = 's', value_name = "SEED", allow_negative_numbers = true, help_heading = PACKING)]
+    /// Seed of the random start: another seed, another sample [default: 1].
+    #[arg(long, short = 's', value_name = "SEED", value_parser = seed, allow_negative_numbers = true, help_heading = PACKING)]
     seed: Option<u64>,
 
-    /// Where the centres come from: random, hexagonal or file.
+    /// Where the centres come from: random, hexagonal (an even N) or file [default: random].
     #[arg(long, value_name = "START", help_heading = PACKING)]
     start: Option<String>,
 
-    /// Start from a CSV file of x, y, radius with a comment `# box = L_x, L_y` (its path is taken from where you are).
+    /// Start from a CSV file with the header x,y,radius and a comment `# box = L_x, L_y`; N, φ and radii are the file's, and
+    /// no disks are relaxed first.
     #[arg(long, value_name = "PACKING.csv", help_heading = PACKING)]
     file: Option<String>,
 
-    /// Line tension γ of the contours.
-    #[arg(long, value_name = "GAMMA", allow_negative_numbers = true, help_heading = PACKING)]
+    /// Line tension γ of the contours, the unit of force, 1e-100 … 1e100 [default: 1].
+    #[arg(long, value_name = "GAMMA", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
     line_tension: Option<f64>,
 
-    /// Converged when the largest net force f_max (units of γ) is not above this.
-    #[arg(long, value_name = "F_MAX", allow_negative_numbers = true, help_heading = RELAXATION)]
+    /// Converged when the largest net force f_max (units of γ) is not above this [default: 1e-10].
+    #[arg(long, value_name = "F_MAX", value_parser = real, allow_negative_numbers = true, help_heading = RELAXATION)]
     threshold: Option<f64>,
 
-    /// End at this step in any case.
-    #[arg(long, value_name = "STEPS", allow_negative_numbers = true, help_heading = RELAXATION)]
+    /// End at this step in any case [default: 200000].
+    #[arg(long, value_name = "STEPS", value_parser = whole, allow_negative_numbers = true, help_heading = RELAXATION)]
     steps: Option<i128>,
 
-    /// Minimiser: fire, or fire+newton (FIRE through the rearrangements, then Newton's method).
+    /// Minimiser: fire, or fire+newton (FIRE through the rearrangements, then Newton's method) [default: fire].
     #[arg(long, value_name = "MINIMIZER", value_parser = named::<softjam::scene::Minimizer>, help_heading = RELAXATION)]
     minimizer: Option<softjam::scene::Minimizer>,
 
-    /// Forces: central (along the lines of centres) or gradient (of the stored energy).
+    /// Forces: central (along the lines of centres) or gradient (of the stored energy) [default: central].
     #[arg(long, value_name = "FORM", value_parser = named::<softjam::force::Form>, help_heading = RELAXATION)]
     forces: Option<softjam::force::Form>,
 
-    /// Upper bound of the time step; by default from the largest frequency.
-    #[arg(long, value_name = "DT", allow_negative_numbers = true, help_heading = RELAXATION)]
+    /// Upper bound of the time step, in √(mass·length/γ) with mass 1 [default: 1/ω_max, from the largest frequency of the
+    /// start].
+    #[arg(long, value_name = "DT", value_parser = real, allow_negative_numbers = true, help_heading = RELAXATION)]
     dt_max: Option<f64>,
 
-    /// How the contact list follows the positions: complementarity or seed.
+    /// How the contact list follows the positions: complementarity (solved for in every step) or seed (one drop-and-add a
+    /// step, as in the paper) [default: complementarity].
     #[arg(long, value_name = "RULE", value_parser = named::<softjam::contact::Rule>, help_heading = RELAXATION)]
     contact_rule: Option<softjam::contact::Rule>,
 
-    /// How A f = δ is solved: conjugate-gradient, sparse-cholesky or gauss-jordan.
+    /// How A f = δ is solved: conjugate-gradient, sparse-cholesky or gauss-jordan [default: conjugate-gradient].
     #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::contact::solver::Method>, help_heading = RELAXATION)]
     contact_solver: Option<softjam::contact::solver::Method>,
 
     #[command(flatten)]
     channels: ChannelFlags,
 
-    /// Vertices of a contour, beside those on the contacts.
+    /// Vertices of a contour, 3 … 4096, beside those on the contacts [default: 32].
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = RECORDING)]
     vertices: Option<usize>,
 }
@@ -79,7 +83,8 @@ pub struct SceneFlags {
 #[derive(Args)]
 pub struct ChannelFlags {
     /// What to record: a list of contours, contacts, metrics, state, each as it is scheduled in the scene or with a
-    /// schedule of its own, as in `metrics,state=every:10,contours=log:20`; what is not named is off.
+    /// schedule of its own, as in `metrics,state=every:10,contours=log:20` (log:K is K steps a decade); what is not named is
+    /// off [default: as in the scene or the recording; in the default scene metrics at every step, the others at every 10th].
     #[arg(long, value_name = "LIST", value_parser = channel_list, help_heading = RECORDING)]
     channels: Option<ChannelList>,
 
@@ -203,7 +208,24 @@ fn channel(channels: &mut Channels, k: usize) -> &mut Schedule {
 /// A unit variant by its name in the scene file.
 pub fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(text);
-    T::deserialize(value).map_err(|e| e.to_string())
+    T::deserialize(value).map_err(|e| e.to_string().replace("unknown variant", "there is no"))
+}
+
+/// A number; whether it is in range is for the scene to say.
+fn real(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "a number is expected, such as 0.9 or 1e-10".to_owned())
+}
+
+/// A whole number; whether it is in range is for the scene to say.
+fn whole(text: &str) -> Result<i128, String> {
+    text.parse()
+        .map_err(|_| "a whole number is expected".to_owned())
+}
+
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("a whole number from 0 to {} is expected", u64::MAX))
 }
 
 fn channel_list(text: &str) -> Result<ChannelList, String> {

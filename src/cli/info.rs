@@ -1,6 +1,9 @@
 //! `softjam info`: says what a recording holds.
 
 use super::{Verdict, print};
+use softjam::contact::FrameContacts;
+use softjam::droplet::validity::{SQUEEZE_LIMIT, Validity};
+use softjam::frame::Frame;
 use softjam::record::Outcome;
 use softjam::replay::{Event, ReadError, Recording};
 use std::collections::BTreeMap;
@@ -10,14 +13,19 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  softjam info run.rrd
-  softjam info run.rrd --json | jq .f_max")]
+  softjam info run.rrd                        what was run, how it ended, what is recorded
+  softjam info run.rrd --json | jq .f_max     one object for scripts: phi, box, converged, metrics, squeeze, …
+
+The squeeze of a particle is Σf/2πγ over its contacts, at the last state: beyond 0.0659 the model's own forces are too small
+by more than 10 %.
+
+Exit codes: 0 read to its end, 1 damaged or not a recording (what comes before the damage is told), 2 a bad flag")]
 pub struct Arguments {
-    /// The recording.
+    /// The recording, .rrd or .mcap.
     #[arg(value_name = "RUN.rrd")]
     file: PathBuf,
 
-    /// Print one JSON object.
+    /// Print one JSON object instead of lines.
     #[arg(long)]
     json: bool,
 }
@@ -29,8 +37,8 @@ struct Findings {
     channels: BTreeMap<String, (u64, u64, u64)>,
     /// The last value of each metric.
     metrics: BTreeMap<&'static str, f64>,
-    /// Step and digest of the last state.
-    last: Option<(u64, [u8; 32])>,
+    /// The last state.
+    last: Option<Frame>,
     result: Option<Outcome>,
     damage: Option<ReadError>,
 }
@@ -41,8 +49,9 @@ impl Findings {
         for event in recording {
             let (channel, step) = match event {
                 Ok(Event::State(frame)) => {
-                    found.last = Some((frame.step, frame.digest()));
-                    ("state", frame.step)
+                    let step = frame.step;
+                    found.last = Some(frame);
+                    ("state", step)
                 }
                 Ok(Event::Drawn { channel, step }) => (channel, step),
                 Ok(Event::Metric {
@@ -71,6 +80,17 @@ impl Findings {
             *steps = (steps.0 + 1, steps.1.min(step), steps.2.max(step));
         }
         found
+    }
+}
+
+impl Findings {
+    /// How far the last state strains the linear model; nothing if it is no state of this packing.
+    fn squeeze(&self, recording: &Recording) -> Option<Validity> {
+        let last = self.last.as_ref()?;
+        let packing = recording.packing(last).ok()?;
+        let contacts = FrameContacts::of(&packing, last);
+        let line_tension = recording.scene().line_tension;
+        Some(Validity::of(&contacts.view(), packing.len(), line_tension))
     }
 }
 
@@ -146,8 +166,18 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         };
         line("state", none.to_owned());
     }
-    if let Some((step, digest)) = found.last {
-        line("digest", format!("{} (state of step {step})", hex(digest)));
+    if let Some(last) = &found.last {
+        let digest = hex(last.digest());
+        line("digest", format!("{digest} (state of step {})", last.step));
+    }
+    if let Some(squeeze) = found.squeeze(recording) {
+        line(
+            "squeeze",
+            format!(
+                "mean {:.4}, largest {:.4} (particle {}); {} of {} particles beyond {SQUEEZE_LIMIT}",
+                squeeze.mean, squeeze.largest, squeeze.particle, squeeze.beyond, squeeze.particles
+            ),
+        );
     }
     for (name, value) in &found.metrics {
         line(name, format!("{value:.6e}"));
@@ -180,7 +210,14 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
         "steps": found.result.map(|r| r.steps),
         "f_max": found.result.map(|r| r.f_max),
         "channels": channels,
-        "digest": found.last.map(|(_, digest)| hex(digest)),
+        "digest": found.last.as_ref().map(|last| hex(last.digest())),
+        "squeeze": found.squeeze(recording).map(|s| serde_json::json!({
+            "mean": s.mean,
+            "largest": s.largest,
+            "particle": s.particle,
+            "beyond": s.beyond,
+            "limit": SQUEEZE_LIMIT,
+        })),
         "metrics": found.metrics,
         "damage": found.damage.as_ref().map(ToString::to_string),
         "scene": recording.scene().to_toml(),

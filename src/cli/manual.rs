@@ -9,7 +9,9 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   softjam manual --pages ~/.local/share/man/man1      then: man softjam-record
-  softjam manual --completions bash > ~/.local/share/bash-completion/completions/softjam")]
+  softjam manual --completions bash > ~/.local/share/bash-completion/completions/softjam
+
+Exit codes: 0 written, 1 could not be written, 2 a bad flag")]
 #[group(required = true)]
 pub struct Arguments {
     /// Write a manual page for the program and one for each of its verbs into this folder.

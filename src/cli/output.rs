@@ -22,16 +22,20 @@ impl Output {
     /// Refuses a file that cannot be created, that is one of `inputs`, or that exists without `force`.
     pub fn check(&self, inputs: &[Option<&Path>], force: bool) -> Result<(), RecordError> {
         let path = self.path.display().to_string();
-        let create = |kind: io::ErrorKind| RecordError::Create {
+        let create = |kind, reason: String| RecordError::Create {
             path: path.clone(),
-            source: kind.into(),
+            source: io::Error::new(kind, reason),
         };
         if self.path.is_dir() {
-            return Err(create(io::ErrorKind::IsADirectory));
+            return Err(create(
+                io::ErrorKind::IsADirectory,
+                "it is a folder; name a file in it".to_owned(),
+            ));
         }
         let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty());
-        if folder.is_some_and(|folder| !folder.is_dir()) {
-            return Err(create(io::ErrorKind::NotFound));
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            let problem = format!("there is no folder {}", folder.display());
+            return Err(create(io::ErrorKind::NotFound, problem));
         }
         if !self.path.exists() {
             return Ok(());

@@ -29,7 +29,11 @@ Examples:
   softjam record --from broken.rrd -o rest.rrd      finish a run that was interrupted
   softjam record --mcap run.mcap                    for Foxglove; beside the .rrd with -o run.rrd
   softjam record --particles 1024 --spawn           and look on
-Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd")]
+  softjam record --file mine.csv -o mine.rrd        a packing of your own, relaxed as it stands
+Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd
+
+Exit codes: 0 converged, 1 could not be done or interrupted (the file is readable up to the last step), 2 the request makes no
+sense, 3 not converged within --steps")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneFlags,
@@ -46,11 +50,11 @@ pub struct Arguments {
     )]
     from: Option<PathBuf>,
 
-    /// The recorded step to go on from; by default the last.
+    /// The recorded step to go on from [default: the last].
     #[arg(long, value_name = "K", requires = "from", help_heading = "Continue")]
     step: Option<u64>,
 
-    /// File to record into; a name that ends in .mcap gives MCAP. Without this and --mcap, softjam.rrd.
+    /// File to record into; a name that ends in .mcap gives MCAP [default: softjam.rrd, if there is no --mcap].
     #[arg(long, short, value_name = "RUN.rrd", help_heading = RECORDING)]
     output: Option<PathBuf>,
 
@@ -236,6 +240,20 @@ fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> 
         Some(frame) if arguments.step.is_none_or(|k| k == frame.step) => {
             let packing = recording.packing(&frame)?;
             Ok(Origin::Frame(scene, packing, Box::new(frame)))
+        }
+        _ if last.is_none() && arguments.step.is_none() => {
+            let closed = recording.is_closed();
+            Err(SceneError::Needs {
+                field: "from".to_owned(),
+                value: path.display().to_string(),
+                needs: if closed {
+                    "a recorded state, which only a recording with --channels state,… has"
+                        .to_owned()
+                } else {
+                    "a recorded state, and breaks off before the first".to_owned()
+                },
+            }
+            .into())
         }
         _ => Err(SceneError::Range {
             field: "step".to_owned(),

@@ -17,13 +17,15 @@ Examples:
   softjam replay run.rrd                       both questions, by one run from the scene
   softjam replay run.rrd --segments            the same verdict, on all cores
   softjam replay run.rrd --only balance        forces and contacts alone, without running again
-  softjam replay run.rrd --against other.rrd   two recordings, frame by frame")]
+  softjam replay run.rrd --against other.rrd   two recordings, frame by frame
+
+Exit codes: 0 verified, 1 could not be done (a damaged file, no state in it) or the file breaks off, 2 a bad flag, 3 not verified")]
 pub struct Arguments {
-    /// The recording.
+    /// The recording, .rrd or .mcap.
     #[arg(value_name = "RUN.rrd")]
     file: PathBuf,
 
-    /// Ask one question only.
+    /// Ask one question only [default: both].
     #[arg(long, value_name = "QUESTION")]
     only: Option<Question>,
 
@@ -31,7 +33,7 @@ pub struct Arguments {
     #[arg(long)]
     segments: bool,
 
-    /// Threads for --segments; by default one a core. The verdict does not depend on it.
+    /// Threads for --segments, 1 … 1024; the verdict does not depend on it [default: one a core].
     #[arg(long, value_name = "N", requires = "segments", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 
@@ -39,7 +41,7 @@ pub struct Arguments {
     #[arg(long, value_name = "OTHER.rrd", conflicts_with_all = ["only", "segments"])]
     against: Option<PathBuf>,
 
-    /// Print one JSON object.
+    /// Print one JSON object instead of lines.
     #[arg(long)]
     json: bool,
 }
@@ -137,8 +139,10 @@ fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
     let found = found?;
     let states = balance.as_ref().map_or(0, |b| b.frames) + found.as_ref().map_or(0, |d| d.states);
     if states == 0 {
-        let path = arguments.file.display().to_string();
-        return Err(ReplayError::NoState { path });
+        return Err(ReplayError::NoState {
+            path: arguments.file.display().to_string(),
+            closed: recording.is_closed(),
+        });
     }
     Ok(Findings {
         determinism: found,

@@ -7,7 +7,9 @@ use super::{Verdict, flags::SceneFlags, print};
 Examples:
   softjam scene > scene.toml              the default scene, every field with its meaning
   softjam scene --phi 0.9 -N 1024         the same with two fields changed
-  softjam scene mine.toml                 checks a file and fills in what it leaves out")]
+  softjam scene mine.toml                 checks a file and fills in what it leaves out
+
+Exit codes: 0 a scene that can be run, 1 the file cannot be read, 2 a bad flag or an invalid scene")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneFlags,

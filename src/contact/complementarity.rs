@@ -17,6 +17,8 @@
 //! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
 //! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
+//!
+//! See the example of [`ContactLaw`], through which this is used.
 
 use super::error::ContactError;
 use super::geometry::{Kept, arrivals, rearrange};

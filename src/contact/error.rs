@@ -3,6 +3,18 @@
 use super::solver::SolverError;
 
 /// Why the contact problem has no answer.
+///
+/// ```
+/// use softjam::contact::{ContactError, ContactLaw};
+/// use softjam::domain::{Domain, Vec2};
+/// use softjam::packing::Packing;
+///
+/// // A disk that is wider than its box touches its own image.
+/// let domain = Domain::new(0.9, 3.0).unwrap();
+/// let packing = Packing::new(domain, vec![0.5], vec![Vec2::new(0.4, 1.0)]).unwrap();
+/// let error = ContactLaw::default().solve(&packing, &[], &[]).unwrap_err();
+/// assert!(matches!(error, ContactError::BoxTooSmall { particle: 0, other: 0, .. }));
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContactError {

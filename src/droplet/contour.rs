@@ -147,17 +147,36 @@ impl Contours {
         contacts: &Contacts<'_>,
         line_tension: f64,
     ) {
+        let mut vertices = core::mem::take(&mut self.vertices);
+        let mut first = core::mem::take(&mut self.first);
+        vertices.clear();
+        first.clear();
+        first.push(0);
+        self.trace(
+            (radii, positions, contacts, line_tension),
+            &mut vertices,
+            |all, _, _| first.push(all.len()),
+        );
+        (self.vertices, self.first) = (vertices, first);
+    }
+
+    /// Appends the polygons of [`draw`](Self::draw) to `vertices`, in double or in a viewer's single precision; `drawn` is
+    /// called after each of them with all vertices so far, the place of its first, and its deepest dent, the largest
+    /// `R_i − ρ_i` at a contact (length).
+    pub(crate) fn trace<V: Vertex>(
+        &mut self,
+        (radii, positions, contacts, line_tension): (&[f64], &[Vec2], &Contacts<'_>, f64),
+        vertices: &mut Vec<V>,
+        mut drawn: impl FnMut(&mut Vec<V>, usize, f64),
+    ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
         self.gather(radii.len(), contacts);
-        self.first.clear();
-        self.first.push(0);
-        self.vertices.clear();
         for (p, (&radius, &centre)) in radii.iter().zip(positions).enumerate() {
             let contacts = &mut self.contacts[self.entry[p]..self.entry[p + 1]];
-            let start = self.vertices.len();
+            let (start, mut deepest) = (vertices.len(), 0.0);
             if contacts.is_empty() {
-                let point = |d: &Direction| centre + Vec2::new(d.cos, d.sin) * radius;
-                self.vertices.extend(self.circle.iter().map(point));
+                let point = |d: &Direction| V::at(centre, *d, radius);
+                vertices.extend(self.circle.iter().map(point));
             } else {
                 contacts.sort_unstable_by(|a, b| a.0.angle.total_cmp(&b.0.angle));
                 let outline = Outline {
@@ -166,14 +185,14 @@ impl Contours {
                     scale: radius / (2.0 * PI * line_tension),
                 };
                 let tips = self.style.placement == Placement::Contacts;
-                outline.draw(&self.circle, contacts, tips, &mut self.vertices);
-                self.evaluations += (self.vertices.len() - start) as u64;
+                deepest = outline.draw(&self.circle, contacts, tips, vertices);
+                self.evaluations += (vertices.len() - start) as u64;
             }
             // Equal angles are counted from 0; with vertices on the contacts any of them may be the first.
             if contacts.is_empty() || self.style.placement == Placement::Equal {
-                self.vertices[start..].rotate_left(self.below);
+                vertices[start..].rotate_left(self.below);
             }
-            self.first.push(self.vertices.len());
+            drawn(vertices, start, deepest);
         }
     }
 
@@ -270,6 +289,30 @@ impl Contours {
     }
 }
 
+/// A vertex in double precision, or in the single precision of a viewer.
+pub(crate) trait Vertex: Copy {
+    /// The vertex at the distance `rho` from `centre` in `direction` (length).
+    fn at(centre: Vec2, direction: Direction, rho: f64) -> Self;
+}
+
+impl Vertex for Vec2 {
+    #[inline]
+    fn at(centre: Vec2, direction: Direction, rho: f64) -> Self {
+        Vec2::new(
+            centre.x + direction.cos * rho,
+            centre.y + direction.sin * rho,
+        )
+    }
+}
+
+impl Vertex for [f32; 2] {
+    #[inline]
+    fn at(centre: Vec2, direction: Direction, rho: f64) -> Self {
+        let v = <Vec2 as Vertex>::at(centre, direction, rho);
+        [v.x as f32, v.y as f32]
+    }
+}
+
 /// One particle that is being drawn.
 struct Outline {
     centre: Vec2,
@@ -278,16 +321,19 @@ struct Outline {
 }
 
 impl Outline {
-    /// Appends the vertices on `circle` and, with `tips`, on the angles of the contacts; both ascend by angle.
-    fn draw(
+    /// Appends the vertices on `circle` and, with `tips`, on the angles of the contacts; both ascend by angle. Gives the
+    /// deepest dent at a contact (length).
+    fn draw<V: Vertex>(
         &self,
         circle: &[Direction],
         contacts: &[(Direction, f64)],
         tips: bool,
-        vertices: &mut Vec<Vec2>,
-    ) {
+        vertices: &mut Vec<V>,
+    ) -> f64 {
+        // The sums of the module's text, in units of length: f R_i/2πγ instead of f.
         let (mut s, mut s_c, mut s_s, mut a_c, mut a_s) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (d, f) in contacts {
+            let f = self.scale * f;
             let (c, s_j) = (f * d.cos, f * d.sin);
             s += f;
             s_c += c;
@@ -295,27 +341,79 @@ impl Outline {
             a_c += c * (d.angle - PI);
             a_s += s_j * (d.angle - PI);
         }
-        let point = |d: &Direction, a_c: f64, a_s: f64| {
-            let sum = d.sin * (a_c - 0.5 * s_s)
-                - d.cos * (a_s + 0.5 * s_c)
-                - d.angle * (d.sin * s_c - d.cos * s_s)
-                - s;
-            self.centre + Vec2::new(d.cos, d.sin) * (self.radius + self.scale * sum)
+        let mut sector = Sector {
+            centre: self.centre,
+            radius: self.radius - s,
+            p: a_c - 0.5 * s_s,
+            q: a_s + 0.5 * s_c,
+            s_c,
+            s_s,
         };
-        let mut rest = circle;
+        let (mut drawn, mut deepest) = (0, 0.0_f64);
         for (contact, f) in contacts {
-            let sector = rest.partition_point(|d| d.angle < contact.angle);
-            let (before, behind) = rest.split_at(sector);
-            vertices.extend(before.iter().map(|d| point(d, a_c, a_s)));
+            let end = before(circle, contact.angle).max(drawn);
+            vertices.extend(
+                circle[drawn..end]
+                    .iter()
+                    .map(move |d| sector.vertex::<V>(d)),
+            );
+            let rho = sector.rho(contact);
+            deepest = deepest.max(self.radius - rho);
             if tips {
-                vertices.push(point(contact, a_c, a_s));
+                vertices.push(V::at(self.centre, *contact, rho));
             }
-            rest = behind;
-            a_c += 2.0 * PI * f * contact.cos;
-            a_s += 2.0 * PI * f * contact.sin;
+            drawn = end;
+            let turn = 2.0 * PI * self.scale * f;
+            sector.p += turn * contact.cos;
+            sector.q += turn * contact.sin;
         }
-        vertices.extend(rest.iter().map(|d| point(d, a_c, a_s)));
+        vertices.extend(circle[drawn..].iter().map(move |d| sector.vertex::<V>(d)));
+        deepest
     }
+}
+
+/// A contour between two neighbouring contacts: `ρ(θ) = R − S + sin θ (P − θ S_c) − cos θ (Q − θ S_s)`, all in units of
+/// length.
+#[derive(Clone, Copy)]
+struct Sector {
+    centre: Vec2,
+    /// `R − S`.
+    radius: f64,
+    /// `A_c − ½ S_s`.
+    p: f64,
+    /// `A_s + ½ S_c`.
+    q: f64,
+    s_c: f64,
+    s_s: f64,
+}
+
+impl Sector {
+    #[inline(always)]
+    fn rho(&self, d: &Direction) -> f64 {
+        let along_sin = self.p - d.angle * self.s_c;
+        let along_cos = self.q - d.angle * self.s_s;
+        self.radius + (d.sin * along_sin - d.cos * along_cos)
+    }
+
+    #[inline(always)]
+    fn vertex<V: Vertex>(&self, d: &Direction) -> V {
+        V::at(self.centre, *d, self.rho(d))
+    }
+}
+
+/// How many directions of a circle of equally spaced ones have a smaller angle than `angle`.
+fn before(circle: &[Direction], angle: f64) -> usize {
+    let n = circle.len();
+    let turns = (angle - circle[0].angle) / (2.0 * PI);
+    // A conversion saturates; what rounding has done to the guess is mended.
+    let mut k = ((turns * n as f64) as usize).min(n);
+    while k > 0 && circle[k - 1].angle >= angle {
+        k -= 1;
+    }
+    while k < n && circle[k].angle < angle {
+        k += 1;
+    }
+    k
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`.
+//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`, curves of what you like.
 //!
 //! A figure is SVG text; [`write()`] makes a PNG of it where the file's name asks for one, with a font of its own, so that
 //! a picture is the same on every machine.
@@ -15,9 +15,11 @@
 //! # std::fs::remove_file(&path).unwrap();
 //! ```
 
+mod chart;
 mod packing;
 mod relaxation;
 
+pub use chart::{Axis, Curve, Mark, Scale, chart};
 pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation};
 
@@ -32,6 +34,12 @@ const FONT: &str = "DejaVu Sans";
 const PIXELS: f32 = 2.0;
 
 /// Why a figure could not be made.
+///
+/// ```
+/// use softjam::figure::{FigureError, png, relaxation};
+/// assert!(matches!(relaxation(&[]), Err(FigureError::Nothing(_))));
+/// assert!(matches!(png("no picture"), Err(FigureError::Draw(_))));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {

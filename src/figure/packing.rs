@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::packing::Packing;
 use core::f64::consts::PI;
 use svg::node::element::path::Data;
-use svg::node::element::{ClipPath, Definitions, Group, Line, Path, Rectangle, Text};
+use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Path, Rectangle, Text};
 use svg::{Document, Node};
 
 /// What a particle is drawn as.
@@ -74,8 +74,8 @@ impl Default for Style {
     }
 }
 
-/// Vertices of a contour: the chord of a unit circle is then off by 1/3000 of its radius.
-const VERTICES: usize = 120;
+/// How far the chords of a contour are off (pixels).
+const CHORD: f64 = 0.05;
 const INK: &str = "#1c1c1c";
 const MARGIN: f64 = 14.0;
 
@@ -88,30 +88,50 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
     let contacts = contacts.view();
     let sheet = Sheet::of(packing.domain(), style.width);
     let mut contours = Contours::new(ContourStyle {
-        vertices: VERTICES,
+        vertices: vertices(sheet.scale * mean(packing.radii())),
         placement: Placement::Contacts,
     });
     contours.draw(packing.radii(), &frame.positions, &contacts, line_tension);
     let shades = Shades::of(style.color, packing.radii(), frame, &contacts, &contours);
 
-    let mut particles = Group::new()
-        .set("stroke", INK)
-        .set("stroke-width", sheet.pixels(0.03 * mean(packing.radii())))
-        .set("stroke-linejoin", "round");
+    let thin = sheet.pixels(0.03 * mean(packing.radii()));
+    let (mut particles, mut outlines) = (Group::new(), Group::new());
     for (p, (&center, &radius)) in frame.positions.iter().zip(packing.radii()).enumerate() {
-        let disk: Vec<Vec2>;
-        let outline = match style.shape {
-            Shape::Contour => contours.polygon(p),
-            Shape::Disk => {
-                disk = circle(center, radius);
-                &disk
+        match style.shape {
+            Shape::Contour => {
+                let outline = contours.polygon(p);
+                for shift in sheet.images(outline) {
+                    let points = outline.iter().map(|v| sheet.place(v + shift));
+                    particles.append(polygon(points).set("fill", shades.fill(p)));
+                }
             }
-        };
-        for shift in sheet.images(outline) {
-            let points = outline.iter().map(|v| sheet.place(v + shift));
-            particles.append(polygon(points).set("fill", shades.fill(p)));
+            // Disks overlap: the outlines lie above all of them, so that the overlaps can be seen.
+            Shape::Disk => {
+                let corner = Vec2::repeat(radius);
+                for shift in sheet.images(&[center - corner, center + corner]) {
+                    let (x, y) = sheet.place(center + shift);
+                    let disk = Circle::new()
+                        .set("cx", x)
+                        .set("cy", y)
+                        .set("r", sheet.pixels(radius));
+                    outlines.append(disk.clone());
+                    particles.append(disk.set("fill", shades.fill(p)));
+                }
+            }
         }
     }
+    let drawn = |group: Group| {
+        group
+            .set("stroke", INK)
+            .set("stroke-width", thin)
+            .set("stroke-linejoin", "round")
+    };
+    let particles = match style.shape {
+        Shape::Contour => drawn(particles),
+        Shape::Disk => Group::new()
+            .add(particles)
+            .add(drawn(outlines).set("fill", "none")),
+    };
     let mut inside = Group::new().set("clip-path", "url(#box)").add(particles);
     if style.chains && !contacts.forces.is_empty() {
         inside.append(chains(&sheet, frame, packing.radii(), &contacts));
@@ -134,6 +154,13 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
         .set("font-size", 13)
         .set("fill", INK)
         .add(Definitions::new().add(clip))
+        // Paper, so that the ink can be read on a dark page too.
+        .add(
+            Rectangle::new()
+                .set("width", "100%")
+                .set("height", "100%")
+                .set("fill", "white"),
+        )
         .add(inside)
         .add(
             outline()
@@ -154,11 +181,10 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-fn circle(center: Vec2, radius: f64) -> Vec<Vec2> {
-    let angles = (0..VERTICES).map(|k| 2.0 * PI * k as f64 / VERTICES as f64);
-    angles
-        .map(|a| center + radius * Vec2::new(libm::cos(a), libm::sin(a)))
-        .collect()
+/// So many vertices that the chords of a circle of this radius (pixels) are off by no more than [`CHORD`].
+fn vertices(radius: f64) -> usize {
+    let sides = PI / (2.0 * CHORD / radius.max(1e-3)).sqrt();
+    (sides as usize).clamp(16, 240)
 }
 
 /// A closed polygon, to a hundredth of a pixel.
@@ -178,7 +204,7 @@ fn polygon(points: impl Iterator<Item = (f64, f64)>) -> Path {
 fn chains(sheet: &Sheet, frame: &Frame, radii: &[f64], contacts: &Contacts<'_>) -> Group {
     let strongest = 3.0;
     let average = mean(contacts.forces);
-    let widest = sheet.pixels(0.13 * mean(radii));
+    let widest = sheet.pixels(0.08 * mean(radii));
     let mut group = Group::new()
         .set("stroke", INK)
         .set("stroke-linecap", "round");
@@ -381,7 +407,8 @@ impl Shades {
             let label = if self.percent {
                 format!("{:.1} %", 100.0 * value)
             } else {
-                format!("{value}")
+                let beyond = part == 1.0 && self.values.iter().any(|v| *v > self.most);
+                format!("{}{value}", if beyond { "≥ " } else { "" })
             };
             bar.append(
                 Text::new(label)

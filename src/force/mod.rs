@@ -48,9 +48,11 @@
 //! | 0.95 | 0.015 | 0.082 | 0.011 | 0.050 | −0.076 % | −0.50 % | 5.625 | 5.633 |
 //! | 1.00 | 0.076 | 0.38 | 0.021 | 0.095 | −0.028 % | −0.50 % | 5.938 | 5.969 |
 
+mod backbone;
 mod form;
 pub(crate) mod turning;
 
+pub use backbone::{Backbone, backbone, held};
 pub(crate) use form::tangent;
 pub use form::{Form, NetForces};
 
@@ -77,6 +79,8 @@ pub const METRICS: [&str; 9] = [
 ];
 
 /// The values of [`METRICS`].
+///
+/// See the example of [`Observables::metrics`].
 pub type Metrics = [f64; METRICS.len()];
 
 /// Net forces of the contacts on each particle, `F_i = Σ_j f_ij n_ij` (force), summed in the order of the contact list.
@@ -206,6 +210,33 @@ impl Observables {
         line_tension: f64,
         (f_max, dt): (f64, f64),
     ) -> Self {
+        let counter = &mut Backbone::default();
+        Self::counted(
+            contacts,
+            domain,
+            particles,
+            line_tension,
+            (f_max, dt),
+            counter,
+        )
+    }
+
+    /// [`of`](Self::of) with a counter of rattlers that remembers the frame before.
+    ///
+    /// # Panics
+    ///
+    /// If a contact names a particle of index ≥ `particles`.
+    ///
+    /// See the example of [`Backbone`].
+    #[must_use]
+    pub fn counted(
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        particles: usize,
+        line_tension: f64,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
         let mut o = Self {
             particles,
             f_max,
@@ -225,12 +256,7 @@ impl Observables {
         for s in &mut o.stress {
             *s /= domain.area() * line_tension;
         }
-        let touching = contacts.pairs.iter().zip(contacts.forces);
-        let touching: Vec<[u32; 2]> = touching
-            .filter(|(_, f)| **f > 0.0)
-            .map(|(p, _)| *p)
-            .collect();
-        (o.rattlers, o.backbone_contacts) = backbone(particles, &touching);
+        (o.rattlers, o.backbone_contacts) = backbone.count(particles, contacts);
         o
     }
 
@@ -328,71 +354,5 @@ pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
         0.0
     } else {
         2.0 * contacts as f64 / held as f64
-    }
-}
-
-/// Rattlers, and the contacts left among the other particles: particles with fewer than three contacts are taken away
-/// with their contacts, until none is left or each has three.
-///
-/// `pairs` are the contacts that bear a force, among particles `0..particles`.
-///
-/// # Panics
-///
-/// If a pair names a particle that is not there.
-///
-/// # Example
-///
-/// ```
-/// use softjam::force::backbone;
-///
-/// // Four particles that all touch each other, and a fifth that leans on two of them.
-/// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
-/// assert_eq!(backbone(5, &pairs), (1, 6));
-/// ```
-#[must_use]
-pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
-    let (numbers, contacts) = held_contacts(particles, pairs);
-    (numbers.iter().filter(|n| **n < 3).count(), contacts)
-}
-
-/// Which particles are held by their contacts, that is, which are no rattlers; see [`backbone`].
-///
-/// # Panics
-///
-/// If a pair names a particle that is not there.
-///
-/// ```
-/// use softjam::force::held;
-///
-/// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
-/// assert_eq!(held(5, &pairs), [true, true, true, true, false]);
-/// ```
-#[must_use]
-pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
-    let (numbers, _) = held_contacts(particles, pairs);
-    numbers.iter().map(|n| *n >= 3).collect()
-}
-
-/// The number of contacts of each particle with others that are held, and the number of contacts between such.
-fn held_contacts(particles: usize, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
-    let mut contacts = vec![0u32; particles];
-    for p in pairs.iter().flatten() {
-        contacts[*p as usize] += 1;
-    }
-    let mut left: Vec<[u32; 2]> = pairs.to_vec();
-    loop {
-        let before = left.len();
-        left.retain(|&[i, j]| {
-            let (i, j) = (i as usize, j as usize);
-            let held = contacts[i] >= 3 && contacts[j] >= 3;
-            if !held {
-                contacts[i] -= 1;
-                contacts[j] -= 1;
-            }
-            held
-        });
-        if left.len() == before {
-            return (contacts, left.len());
-        }
     }
 }

@@ -3,7 +3,8 @@
 use super::columns::{Column, lists, offsets};
 use rerun::ComponentDescriptor;
 use rerun::external::arrow::array::{
-    Array as _, ArrayRef, FixedSizeListArray, Float32Array, StringArray, UInt32Array,
+    Array as _, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, StringArray, UInt8Array,
+    UInt32Array,
 };
 use rerun::external::arrow::buffer::Buffer;
 use rerun::external::arrow::datatypes::Field;
@@ -15,22 +16,22 @@ pub(super) trait Number: Copy {
     fn array(values: Vec<Self>) -> ArrayRef;
 }
 
-impl Number for f32 {
-    fn array(values: Vec<Self>) -> ArrayRef {
-        Arc::new(Float32Array::from(values))
-    }
+macro_rules! numbers {
+    ($($number:ty: $array:ty),*) => {$(
+        impl Number for $number {
+            fn array(values: Vec<Self>) -> ArrayRef {
+                Arc::new(<$array>::from(values))
+            }
+        }
+    )*};
 }
 
-impl Number for u32 {
-    fn array(values: Vec<Self>) -> ArrayRef {
-        Arc::new(UInt32Array::from(values))
-    }
-}
+numbers!(f32: Float32Array, f64: Float64Array, u32: UInt32Array, u8: UInt8Array);
 
 /// Cells in the making; their rows are those of the strips or points beside which they stand.
 #[derive(Clone)]
 pub(super) struct Cells<T, const W: usize> {
-    values: Vec<T>,
+    values: Vec<[T; W]>,
     /// Where the cells of each row end.
     rows: Vec<usize>,
 }
@@ -55,18 +56,23 @@ impl<T: Number, const W: usize> Cells<T, W> {
 
     /// Adds a cell to the row at hand.
     pub fn push(&mut self, cell: [T; W]) {
-        self.values.extend_from_slice(&cell);
+        self.values.push(cell);
+    }
+
+    /// Adds cells to the row at hand.
+    pub fn extend(&mut self, cells: impl IntoIterator<Item = [T; W]>) {
+        self.values.extend(cells);
     }
 
     /// Closes the row at hand.
     pub fn end_row(&mut self) {
-        self.rows.push(self.values.len() / W);
+        self.rows.push(self.values.len());
     }
 
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let rows = offsets(&self.rows)?;
-        let mut values = T::array(self.values);
+        let mut values = T::array(self.values.into_flattened());
         if W > 1 {
             let item = Arc::new(Field::new("item", values.data_type().clone(), false));
             values = Arc::new(FixedSizeListArray::new(item, W as i32, values, None));

@@ -1,7 +1,10 @@
 //! Rows of line strips, gathered component by component: what a viewer gets most bytes of is copied least.
 
-use super::pictures::Rgb;
+use super::pictures::{Network, Rgb};
+use crate::contact::Contacts;
 use crate::domain::Vec2;
+use crate::droplet::contour::Contours;
+use crate::frame::Frame;
 use rerun::external::arrow::array::{
     Array, ArrayRef, FixedSizeListArray, Float32Array, ListArray, UInt32Array,
 };
@@ -14,6 +17,15 @@ use std::sync::Arc;
 /// A component of a chunk, one list a row.
 pub(super) type Column = (ComponentDescriptor, ListArray);
 
+/// What contours are drawn with and from: radii (length), frame, contacts, line tension γ (force).
+pub(super) type Drawing<'a> = (
+    &'a mut Contours,
+    &'a [f64],
+    &'a Frame,
+    &'a Contacts<'a>,
+    f64,
+);
+
 /// `LineStrips2D` rows in the making.
 #[derive(Default)]
 pub(super) struct StripRows {
@@ -23,7 +35,7 @@ pub(super) struct StripRows {
     rows: Vec<usize>,
     /// Where the points of each strip end.
     strips: Vec<usize>,
-    points: Vec<f32>,
+    points: Vec<[f32; 2]>,
     colors: Vec<u32>,
     radii: Vec<f32>,
 }
@@ -42,17 +54,51 @@ impl StripRows {
     }
 
     /// Adds a strip to the row at hand.
-    pub fn strip<'a>(&mut self, points: impl IntoIterator<Item = &'a Vec2>, [r, g, b]: Rgb) {
-        for v in points {
-            self.points.extend_from_slice(&[v.x as f32, v.y as f32]);
-        }
-        self.strips.push(self.points.len() / 2);
-        self.colors.push(u32::from_be_bytes([r, g, b, 255]));
+    pub fn strip(&mut self, points: impl IntoIterator<Item = [f32; 2]>, color: Rgb) {
+        self.points.extend(points);
+        self.strips.push(self.points.len());
+        self.colors.push(rgba(color));
     }
 
     /// Half the width of the strip added last (length); either all strips of an entity have one or none.
     pub fn half_width(&mut self, half_width: f64) {
         self.radii.push(half_width as f32);
+    }
+
+    /// Adds the closed contours of all particles to the row at hand: their number of vertices. `each` is told particle,
+    /// contour and deepest dent (length), and says the colour.
+    pub fn contours(
+        &mut self,
+        (contours, radii, frame, contacts, line_tension): Drawing<'_>,
+        mut each: impl FnMut(usize, &[[f32; 2]], f64) -> Rgb,
+    ) -> usize {
+        let (before, mut p) = (self.points.len(), 0);
+        let (strips, colors) = (&mut self.strips, &mut self.colors);
+        contours.trace(
+            (radii, &frame.positions, contacts, line_tension),
+            &mut self.points,
+            |points, first, deepest| {
+                points.push(points[first]);
+                strips.push(points.len());
+                colors.push(rgba(each(p, &points[first..], deepest)));
+                p += 1;
+            },
+        );
+        self.points.len() - before
+    }
+
+    /// Adds the segments of a network to the row at hand.
+    pub fn network(&mut self, network: &Network) {
+        let single = |v: &Vec2| [v.x as f32, v.y as f32];
+        let ends = (1..=network.segments.len()).map(|k| self.points.len() + 2 * k);
+        self.strips.extend(ends);
+        self.points
+            .extend(network.segments.as_flattened().iter().map(single));
+        let relative = network.relative.iter();
+        self.colors
+            .extend(relative.clone().map(|&r| rgba(Network::color(r))));
+        self.radii
+            .extend(relative.map(|&r| network.half_width(r) as f32));
     }
 
     /// Closes the row at hand.
@@ -65,8 +111,12 @@ impl StripRows {
     pub fn into_columns(self) -> io::Result<Vec<Column>> {
         let rows = offsets(&self.rows)?;
         let point = Arc::new(Field::new("item", DataType::Float32, false));
-        let points =
-            FixedSizeListArray::new(point, 2, array(Float32Array::from(self.points)), None);
+        let points = FixedSizeListArray::new(
+            point,
+            2,
+            array(Float32Array::from(self.points.into_flattened())),
+            None,
+        );
         let item = Arc::new(Field::new("item", points.data_type().clone(), false));
         let strips = ListArray::new(item, offsets(&self.strips)?, array(points), None);
         let mut columns = vec![
@@ -87,7 +137,12 @@ impl StripRows {
     }
 }
 
-fn array(array: impl Array + 'static) -> ArrayRef {
+/// An opaque colour as rerun has it.
+fn rgba([r, g, b]: Rgb) -> u32 {
+    u32::from_be_bytes([r, g, b, 255])
+}
+
+pub(super) fn array(array: impl Array + 'static) -> ArrayRef {
     Arc::new(array)
 }
 
@@ -106,7 +161,7 @@ pub(super) fn offsets(ends: &[usize]) -> io::Result<OffsetBuffer<i32>> {
     let narrow = narrow.map_err(|_| {
         io::Error::new(
             io::ErrorKind::InvalidInput,
-            "more than 2^31 vertices in one batch; record fewer of them (--vertices) or no contours",
+            "more than 2^31 entries in one batch; record fewer vertices (--vertices) or no contours",
         )
     })?;
     Ok(OffsetBuffer::new(ScalarBuffer::from(narrow)))

@@ -1,7 +1,7 @@
 //! What does not change in a recording: scene, axes, box, radii, and how things look.
 
+use super::columns::array;
 use super::encode::Encoder;
-use super::rrd::array;
 use super::{FORMAT_VERSION, Header, PROGRAM, legend};
 use crate::scene::Start;
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};

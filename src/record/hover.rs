@@ -33,12 +33,13 @@ impl ParticleRows {
         }
     }
 
-    /// Adds the next particle, at `centre` and of undeformed `radius` (lengths), with the vertices of its contour: `p 0.125, Z 5, ΔR/R 0.0346`;
-    /// `line_tension` is γ.
+    /// Adds the next particle, at `centre` and with its deepest dent relative to its undeformed radius: `p 0.125, Z 5,
+    /// ΔR/R 0.0346`; `line_tension` is γ.
     pub fn particle(
         &mut self,
         particles: &Particles,
-        (centre, radius, contour): (Vec2, f64, &[Vec2]),
+        centre: Vec2,
+        deepest: f64,
         line_tension: f64,
         p: usize,
     ) {
@@ -51,7 +52,7 @@ impl ParticleRows {
         numbers.push(", Z ");
         numbers.push_count(particles.contacts[p]);
         numbers.push(", ΔR/R ");
-        numbers.push_number(deformation(centre, radius, contour));
+        numbers.push_number(deepest);
         if !particles.held[p] {
             numbers.push(", rattler");
         }
@@ -80,19 +81,6 @@ impl ParticleRows {
 
 fn middle(part: u8) -> u8 {
     (BRIGHTNESS * f64::from(part) + 0.5) as u8
-}
-
-/// `max |ΔR|/R` over the vertices of a contour; with a vertex on each contact angle, where the dents are deepest, that is
-/// over the contour.
-fn deformation(centre: Vec2, radius: f64, contour: &[Vec2]) -> f64 {
-    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-    for v in contour {
-        let squared = (v - centre).norm_squared();
-        least = least.min(squared);
-        most = most.max(squared);
-    }
-    let off = |squared: f64| (squared.sqrt() / radius - 1.0).abs();
-    off(least).max(off(most))
 }
 
 /// Rows of the numbers of contacts in the making, in the order of the contacts.

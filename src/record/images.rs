@@ -12,16 +12,22 @@ use std::io;
 
 /// The shifts by a period that bring at least one of `vertices` into the open box, but for none at all: none for most
 /// shapes, one for a shape across an edge, up to three for one across a corner.
-pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[Vec2], mut each: impl FnMut(Vec2)) {
+pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each: impl FnMut(Vec2)) {
     let l = domain.lengths();
-    let (mut least, mut most) = (l, Vec2::zeros());
+    // Comparisons rather than minima: the loop is run for every vertex of every frame.
+    let (mut least, mut most) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
     for v in vertices {
-        least = least.inf(v);
-        most = most.sup(v);
+        for k in 0..2 {
+            least[k] = if v[k] < least[k] { v[k] } else { least[k] };
+            most[k] = if v[k] > most[k] { v[k] } else { most[k] };
+        }
     }
+    let double = |&[x, y]: &[f32; 2]| Vec2::new(x.into(), y.into());
+    let (least, most) = (double(&least), double(&most));
     around(l, least, most, |shift| {
-        let inside = |v: &Vec2| {
-            let (x, y) = (v.x + shift.x, v.y + shift.y);
+        let inside = |v: &[f32; 2]| {
+            let v = double(v) + shift;
+            let (x, y) = (v.x, v.y);
             x > 0.0 && x < l.x && y > 0.0 && y < l.y
         };
         if vertices.iter().any(inside) {
@@ -74,7 +80,6 @@ pub(super) struct ImageRows {
     pub strips: StripRows,
     /// What each is the image of: the number of a particle or of a contact.
     pub of: Cells<u32, 1>,
-    shifted: Vec<Vec2>,
 }
 
 impl ImageRows {
@@ -83,21 +88,18 @@ impl ImageRows {
         Self {
             strips: StripRows::with_room_of(&other.strips),
             of: Cells::with_room_of(&other.of),
-            shifted: Vec::new(),
         }
     }
 
     /// Adds the image of `points` of number `of`, moved by `shift`; `points` have the colour `rgb`.
-    pub fn image<'a>(
-        &mut self,
-        points: impl IntoIterator<Item = &'a Vec2>,
-        shift: Vec2,
-        rgb: Rgb,
-        of: usize,
-    ) {
-        self.shifted.clear();
-        self.shifted.extend(points.into_iter().map(|v| v + shift));
-        self.strips.strip(&self.shifted, dim(rgb));
+    pub fn image(&mut self, points: &[[f32; 2]], shift: Vec2, rgb: Rgb, of: usize) {
+        let moved = |&[x, y]: &[f32; 2]| {
+            [
+                (f64::from(x) + shift.x) as f32,
+                (f64::from(y) + shift.y) as f32,
+            ]
+        };
+        self.strips.strip(points.iter().map(moved), dim(rgb));
         self.of.push([of as u32]);
     }
 
@@ -124,11 +126,11 @@ mod tests {
         Domain::new(10.0, 6.0).unwrap()
     }
 
-    fn square(x: f64, y: f64) -> [Vec2; 4] {
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| Vec2::new(x + a, y + b))
+    fn square(x: f32, y: f32) -> [[f32; 2]; 4] {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[a, b]| [x + a, y + b])
     }
 
-    fn polygon(x: f64, y: f64) -> Vec<[f64; 2]> {
+    fn polygon(x: f32, y: f32) -> Vec<[f64; 2]> {
         let mut shifts = Vec::new();
         shifts_of_polygon(domain(), &square(x, y), |s| shifts.push([s.x, s.y]));
         shifts

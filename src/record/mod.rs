@@ -32,6 +32,7 @@ mod pictures;
 mod rrd;
 mod scene_update;
 mod sink;
+mod states;
 mod writer;
 
 pub use live::{Ended, Live, LiveError, Shown, Viewer};
@@ -39,7 +40,7 @@ pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
 pub use writer::{Writer, Written};
 
-use crate::force::Metrics;
+use crate::force::{Backbone, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Status};
@@ -147,13 +148,23 @@ impl Snapshot {
     /// See the example of [`Snapshot`].
     #[must_use]
     pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
+        Self::counted(run, channels, edge, &mut Backbone::default())
+    }
+
+    /// [`of`](Self::of) with a counter of rattlers that remembers the snapshot before.
+    pub(crate) fn counted(
+        run: &Relaxation,
+        channels: &Channels,
+        edge: bool,
+        backbone: &mut Backbone,
+    ) -> Option<Self> {
         let step = run.step();
         let [contours, contacts, metrics, state] = channels.at(step, edge);
         let frame = contours || contacts || state;
         (frame || metrics).then(|| Self {
             step,
             nanoseconds: nanoseconds(run.time()),
-            metrics: metrics.then(|| run.observables().metrics()),
+            metrics: metrics.then(|| run.observables_counted(backbone).metrics()),
             frame: frame.then(|| run.frame()),
             contours,
             contacts,
@@ -170,19 +181,23 @@ pub(crate) fn nanoseconds(time: f64) -> i64 {
 /// Turns snapshots into a file of one format.
 ///
 /// ```
-/// use softjam::{record::{Header, McapRecorder, Recorder, RrdRecorder}, relax::Relaxation, scene::Scene};
+/// use softjam::record::{Header, McapRecorder, Recorder, RrdRecorder, Snapshot};
+/// use softjam::{relax::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let run = Relaxation::new(&scene).unwrap();
 /// let header = Header::of(&scene, &run);
+/// let snapshot = Snapshot::of(&run, &scene.channels, true).unwrap();
 /// let (mut rrd, mut mcap) = (Vec::new(), Vec::new());
 /// let recorders: [Box<dyn Recorder + '_>; 2] = [
 ///     Box::new(RrdRecorder::new(&mut rrd, header.clone()).unwrap()),
 ///     Box::new(McapRecorder::new(&mut mcap, header).unwrap()),
 /// ];
 /// for mut recorder in recorders {
+///     recorder.record(&snapshot).unwrap();
 ///     let written = recorder.finish(None).unwrap();
-///     assert_eq!((written.states, written.bytes), (0, recorder.written()));
+///     assert_eq!((written.states, written.bytes), (1, recorder.written()));
+///     assert_eq!(recorder.intact(), Some(0), "step 0 is in the file");
 /// }
 /// ```
 pub trait Recorder {
@@ -191,12 +206,18 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step that it holds in full.
+    ///
+    /// See the example of [`Recorder`].
     fn record(&mut self, snapshot: &Snapshot) -> io::Result<()>;
 
     /// The last step that the sink holds in full.
+    ///
+    /// See the example of [`Recorder`].
     fn intact(&self) -> Option<u64>;
 
     /// Bytes that the sink holds and that make sense on their own: what comes behind them is a torn end.
+    ///
+    /// See the example of [`Recorder`].
     fn written(&self) -> u64;
 
     /// Writes what is left and the outcome and closes the file. Without an outcome the recording is one of an
@@ -205,6 +226,8 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with.
+    ///
+    /// See the example of [`Recorder`].
     fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written>;
 }
 
@@ -264,17 +287,23 @@ pub struct Summary {
 }
 
 /// Why a recording could not be made.
+///
+/// ```
+/// use softjam::record::RecordError;
+/// let error = RecordError::Exists { path: "run.rrd".to_owned() };
+/// assert!(error.to_string().contains("--force"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
     /// The file exists and is not to be replaced.
-    #[error("{path} exists; say --force to replace it, or name another file with -o")]
+    #[error("{path} exists; say --force to replace it, or name another file")]
     Exists {
         /// Path of the file.
         path: String,
     },
     /// The file is one that the run reads from.
-    #[error("{path} is an input of this run; name another file with -o")]
+    #[error("{path} is what is read from; name another file to write")]
     Input {
         /// Path of the file.
         path: String,
@@ -355,11 +384,13 @@ pub fn record_live(
     mut watch: impl FnMut(&Relaxation) -> bool,
 ) -> Result<Summary, RecordError> {
     let first = run.step();
+    let mut backbone = Backbone::default();
     loop {
         let status = run.status();
         let goes_on = watch(run);
         let last = status != Status::Running || !goes_on;
-        if let Some(snapshot) = Snapshot::of(run, channels, last || run.step() == first) {
+        let edge = last || run.step() == first;
+        if let Some(snapshot) = Snapshot::counted(run, channels, edge, &mut backbone) {
             let snapshot = Arc::new(snapshot);
             for writer in &mut writers {
                 writer.send(Arc::clone(&snapshot))?;

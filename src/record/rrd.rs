@@ -18,35 +18,31 @@
 //! Images, points and disks belong to the channel of the contours or contacts that they stand beside, which are instance by
 //! instance the particles and the contacts of the state.
 //!
-//! Rows are gathered into chunks of about a megabyte, so that a viewer reads few of them; all channels of a batch of
+//! Rows are gathered into chunks of about two megabytes, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
-use super::columns::{Column, StripRows, lists};
+use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::{ImageRows, shifts_of_polygon, shifts_of_segment};
 use super::pictures::{Network, Particles};
+use super::states::StateRows;
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
 use crate::contact::{Contacts, FrameContacts};
-use crate::domain::Vec2;
 use crate::droplet::contour::Contours;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::packing::Packing;
-use rerun::external::arrow::array::{
-    ArrayRef, BooleanArray, FixedSizeListArray, Float64Array, UInt8Array, UInt32Array, UInt64Array,
-};
+use rerun::external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt64Array};
 use rerun::external::arrow::buffer::OffsetBuffer;
-use rerun::external::arrow::datatypes::{DataType, Field};
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
-use rerun::{AsComponents, DynamicArchetype, Scalars, TimeColumn, TimePoint, Timeline};
+use rerun::{DynamicArchetype, Scalars, TimeColumn, TimePoint};
 use std::io::{self, Write};
-use std::sync::Arc;
 
 /// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
 /// is killed loses no more than a batch.
-const BATCH_BYTES: usize = 1 << 20;
+const BATCH_BYTES: usize = 1 << 21;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 
@@ -98,7 +94,7 @@ struct Pending {
     contacts: StripRows,
     contact_images: ImageRows,
     contact_numbers: ContactRows,
-    states: Vec<Row<DynamicArchetype>>,
+    states: StateRows,
     bytes: usize,
     snapshots: usize,
     first: Option<u64>,
@@ -107,11 +103,6 @@ struct Pending {
 
 /// A step, its simulated time in nanoseconds and its metrics.
 type MetricRow = (u64, i64, Metrics);
-
-struct Row<T> {
-    time: TimePoint,
-    data: T,
-}
 
 impl<W: Write> RrdRecorder<W> {
     /// Starts a recording: blueprint, scene, box, radii.
@@ -163,11 +154,9 @@ impl<W: Write> RrdRecorder<W> {
             let digest = frame.digest();
             self.digests.update(&digest);
             self.states += 1;
-            let time = TimePoint::default()
-                .with(Timeline::new_sequence("step"), snapshot.step as i64)
-                .with(Timeline::new_duration("sim_time"), snapshot.nanoseconds);
-            let data = state(frame, &digest);
-            self.pending.states.push(Row { time, data });
+            self.pending
+                .states
+                .row(snapshot.nanoseconds, frame, &digest);
             self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
         }
     }
@@ -175,8 +164,6 @@ impl<W: Write> RrdRecorder<W> {
     fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
         let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
         let (domain, radii) = (self.packing.domain(), self.packing.radii());
-        self.contours
-            .draw(radii, &frame.positions, contacts, self.line_tension);
         let seen = Particles::of(radii, contacts);
         let Pending {
             contours,
@@ -184,20 +171,26 @@ impl<W: Write> RrdRecorder<W> {
             particles,
             ..
         } = &mut self.pending;
-        for (p, (&centre, &radius)) in frame.positions.iter().zip(radii).enumerate() {
-            let polygon = self.contours.polygon(p);
+        let line_tension = self.line_tension;
+        let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
+        let vertices = contours.contours(drawing, |p, polygon, deepest| {
             let color = seen.color(p);
-            contours.strip(polygon.iter().chain(polygon.first()), color);
             shifts_of_polygon(domain, polygon, |shift| {
-                images.image(polygon.iter().chain(polygon.first()), shift, color, p);
+                images.image(polygon, shift, color, p);
             });
-            let shape = (centre, radius, polygon);
-            particles.particle(&seen, shape, self.line_tension, p);
-        }
+            particles.particle(
+                &seen,
+                frame.positions[p],
+                deepest / radii[p],
+                line_tension,
+                p,
+            );
+            color
+        });
         contours.end_row(step, nanoseconds);
         images.end_row(step, nanoseconds);
         particles.end_row();
-        self.pending.bytes += 8 * self.contours.vertices() + 64 * radii.len();
+        self.pending.bytes += 8 * vertices + 64 * radii.len();
     }
 
     fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
@@ -210,14 +203,13 @@ impl<W: Write> RrdRecorder<W> {
             contact_numbers: numbers,
             ..
         } = &mut self.pending;
+        rows.network(&network);
         for (c, (segment, &relative)) in network.segments.iter().zip(&network.relative).enumerate()
         {
-            let (color, half_width) = (Network::color(relative), network.half_width(relative));
-            rows.strip(segment, color);
-            rows.half_width(half_width);
             shifts_of_segment(domain, segment, |shift| {
-                images.image(segment, shift, color, c);
-                images.strips.half_width(half_width);
+                let single = segment.map(|v| [v.x as f32, v.y as f32]);
+                images.image(&single, shift, Network::color(relative), c);
+                images.strips.half_width(network.half_width(relative));
             });
         }
         rows.end_row(step, nanoseconds);
@@ -241,6 +233,7 @@ impl<W: Write> RrdRecorder<W> {
             contacts: StripRows::with_room_of(&pending.contacts),
             contact_images: ImageRows::with_room_of(&pending.contact_images),
             contact_numbers: ContactRows::with_room_of(&pending.contact_numbers),
+            states: StateRows::with_room_of(&pending.states),
             ..Pending::default()
         };
         self.write_particles(pending.contours, pending.contour_images, pending.particles)?;
@@ -250,21 +243,10 @@ impl<W: Write> RrdRecorder<W> {
             pending.contact_numbers,
         )?;
         self.write_metrics(&pending.metrics)?;
-        self.write_rows("/state", pending.states)?;
+        let times = pending.states.times.clone();
+        self.write_columns("/state", &times, pending.states.into_columns()?)?;
         self.intact = pending.last.or(self.intact);
         Ok(())
-    }
-
-    fn write_rows<T: AsComponents>(&mut self, entity: &str, rows: Vec<Row<T>>) -> io::Result<()> {
-        if rows.is_empty() {
-            return Ok(());
-        }
-        let mut builder = Chunk::builder_with_id(self.encoder.chunk_id(), entity);
-        for row in rows {
-            builder = builder.with_archetype(self.encoder.row_id(), row.time, &row.data);
-        }
-        self.encoder
-            .append(&self.store, &builder.build().map_err(io::Error::other)?)
     }
 
     fn write_particles(
@@ -398,32 +380,4 @@ impl<W: Write> Recorder for RrdRecorder<W> {
             states: self.states,
         })
     }
-}
-
-pub(super) fn array(array: impl rerun::external::arrow::array::Array + 'static) -> ArrayRef {
-    Arc::new(array)
-}
-
-/// The lossless state.
-fn state(frame: &Frame, digest: &[u8; 32]) -> DynamicArchetype {
-    let pairs_of = |v: &[Vec2]| {
-        let flat = Float64Array::from_iter_values(v.iter().flat_map(|p| [p.x, p.y]));
-        pairs(DataType::Float64, array(flat))
-    };
-    let contacts = UInt32Array::from_iter_values(frame.contacts.iter().flatten().copied());
-    DynamicArchetype::new("softjam.State")
-        .with_component_from_data("position", pairs_of(&frame.positions))
-        .with_component_from_data("velocity", pairs_of(&frame.velocities))
-        .with_component_from_data("contact", pairs(DataType::UInt32, array(contacts)))
-        .with_component_from_data("force", array(Float64Array::from(frame.forces.clone())))
-        .with_component_from_data(
-            "minimizer",
-            array(Float64Array::from(frame.minimizer.values())),
-        )
-        .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())))
-}
-
-fn pairs(of: DataType, flat: ArrayRef) -> ArrayRef {
-    let item = Arc::new(Field::new("item", of, false));
-    array(FixedSizeListArray::new(item, 2, flat, None))
 }

@@ -11,6 +11,9 @@ use std::thread::JoinHandle;
 /// Snapshots that may wait for the disk before the run does.
 const QUEUE: usize = 8;
 
+/// Snapshots without a frame that are handed over together: waking the thread costs more than the metrics of a step.
+const TOGETHER: usize = 64;
+
 /// A recording in the making: takes snapshots, encodes and writes them on a thread of its own.
 ///
 /// # Example
@@ -20,6 +23,8 @@ const QUEUE: usize = 8;
 pub struct Writer {
     queue: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<Result<Written, Failure>>>,
+    /// Snapshots not yet handed over.
+    held: Vec<Arc<Snapshot>>,
     path: String,
 }
 
@@ -38,7 +43,7 @@ pub struct Written {
 
 #[derive(Debug)]
 enum Message {
-    Snapshot(Arc<Snapshot>),
+    Snapshots(Vec<Arc<Snapshot>>),
     Finish(Option<Outcome>),
 }
 
@@ -117,11 +122,12 @@ impl Writer {
         Ok(Self {
             queue: Some(queue),
             thread: Some(thread),
+            held: Vec::new(),
             path: name,
         })
     }
 
-    /// Hands a snapshot to the thread; waits while the queue is full.
+    /// Hands a snapshot to the thread, those without a frame some at a time; waits while the queue is full.
     ///
     /// # Errors
     ///
@@ -129,7 +135,18 @@ impl Writer {
     ///
     /// See the example of the [module](super).
     pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
-        self.post(Message::Snapshot(snapshot.into()))
+        let snapshot = snapshot.into();
+        let small = snapshot.frame.is_none();
+        self.held.push(snapshot);
+        if small && self.held.len() < TOGETHER {
+            return Ok(());
+        }
+        self.hand_over()
+    }
+
+    fn hand_over(&mut self) -> Result<(), RecordError> {
+        let held = core::mem::take(&mut self.held);
+        self.post(Message::Snapshots(held))
     }
 
     /// Writes what is left and closes the file; without an outcome the recording is marked as unfinished.
@@ -140,6 +157,7 @@ impl Writer {
     ///
     /// See the example of the [module](super).
     pub fn finish(mut self, outcome: Option<Outcome>) -> Result<Written, RecordError> {
+        self.hand_over()?;
         self.post(Message::Finish(outcome))?;
         self.join()
     }
@@ -177,7 +195,10 @@ impl Writer {
 /// A writer that is dropped without [`Writer::finish`] leaves what it was given, unfinished but readable.
 impl Drop for Writer {
     fn drop(&mut self) {
-        self.queue = None;
+        if let Some(queue) = self.queue.take() {
+            let held = core::mem::take(&mut self.held);
+            drop(queue.send(Message::Snapshots(held)));
+        }
         if let Some(thread) = self.thread.take() {
             // Whoever drops a writer has another failure to report.
             drop(thread.join());
@@ -206,9 +227,11 @@ fn write<R: Recorder>(
     let mut result = Ok(());
     while result.is_ok() {
         match messages.recv() {
-            Ok(Message::Snapshot(snapshot)) => {
-                step = snapshot.step;
-                result = recorder.record(&snapshot);
+            Ok(Message::Snapshots(snapshots)) => {
+                result = snapshots.iter().try_for_each(|snapshot| {
+                    step = snapshot.step;
+                    recorder.record(snapshot)
+                });
             }
             Ok(Message::Finish(end)) => {
                 outcome = end;

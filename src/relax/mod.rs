@@ -29,7 +29,7 @@ pub use status::{RelaxError, Status};
 use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
-use crate::force::{NetForces, Observables, largest_force};
+use crate::force::{Backbone, NetForces, Observables, largest_force};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::scene::{Minimizer, Scene, start};
@@ -440,12 +440,20 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn observables(&self) -> Observables {
-        Observables::of(
+        self.observables_counted(&mut Backbone::default())
+    }
+
+    /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
+    ///
+    /// See the example of [`Backbone`].
+    pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
+        Observables::counted(
             &self.law.contacts(),
             self.packing.domain(),
             self.packing.len(),
             self.law.line_tension(),
             (self.f_max, self.state.dt),
+            backbone,
         )
         .with_torques(
             &self.law.contacts(),

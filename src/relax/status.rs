@@ -22,6 +22,14 @@ pub enum Status {
 }
 
 /// Why a relaxation cannot go on.
+///
+/// ```
+/// use softjam::{relax::{Relaxation, RelaxError}, scene::Scene};
+/// let scene = Scene { particles: 64, phi: 0.9, dt_max: Some(1e3), ..Scene::default() };
+/// let mut run = Relaxation::new(&scene).unwrap();
+/// let error = (0..1000).find_map(|_| run.advance().err()).unwrap();
+/// assert!(matches!(error, RelaxError::TooFar { .. } | RelaxError::Contact { .. }), "{error}");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RelaxError {

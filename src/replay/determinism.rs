@@ -6,7 +6,7 @@
 
 use super::difference::{self, Difference, What};
 use super::{Metrics, ReadError, Recording, State};
-use crate::force::{METRICS, Observables};
+use crate::force::{Backbone, METRICS, Observables};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation};
@@ -29,6 +29,8 @@ pub enum Way {
 }
 
 /// What a replay found.
+///
+/// See the example of [`determinism`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Determinism {
     /// Recorded states.
@@ -42,6 +44,12 @@ pub struct Determinism {
 }
 
 /// Why a replay came to no verdict.
+///
+/// ```
+/// use softjam::replay::ReplayError;
+/// let error = ReplayError::NoState { path: "run.rrd".to_owned(), closed: true };
+/// assert!(error.to_string().contains("not replayed"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
@@ -52,10 +60,15 @@ pub enum ReplayError {
     #[error("the scene cannot be run again: {0}")]
     Run(#[from] RelaxError),
     /// There is nothing to compare.
-    #[error("{path} holds no state: it can be looked at, not replayed")]
+    #[error(
+        "{path} holds no state{}: it can be looked at, not replayed",
+        if *closed { "" } else { " before it breaks off" }
+    )]
     NoState {
         /// Path of the file.
         path: String,
+        /// Whether the file is complete.
+        closed: bool,
     },
 }
 
@@ -129,8 +142,10 @@ pub fn determinism(
         }
     }
     if verdict.states == 0 {
-        let path = recording.path().to_owned();
-        return Err(ReplayError::NoState { path });
+        return Err(ReplayError::NoState {
+            path: recording.path().to_owned(),
+            closed: recording.is_closed(),
+        });
     }
     Ok(verdict)
 }
@@ -234,9 +249,10 @@ fn first_run(
 
 /// Advances `run` to the segment's end; the first difference on the way.
 fn walk(run: &mut Relaxation, segment: &Segment) -> Result<Option<Difference>, RelaxError> {
+    let mut backbone = Backbone::default();
     loop {
         if let Some(metrics) = segment.metrics.get(&run.step())
-            && let Some(what) = metrics_differ(&run.observables(), metrics)
+            && let Some(what) = metrics_differ(&run.observables_counted(&mut backbone), metrics)
         {
             let step = run.step();
             return Ok(Some(Difference { step, what }));

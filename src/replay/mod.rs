@@ -66,6 +66,13 @@ pub enum Event {
 }
 
 /// Why a recording cannot be read.
+///
+/// ```
+/// use softjam::replay::{ReadError, Recording};
+/// let error = Recording::open("no/such/run.rrd").err().unwrap();
+/// assert!(matches!(error, ReadError::Open { .. }));
+/// assert!(error.to_string().starts_with("cannot read no/such/run.rrd"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
@@ -88,7 +95,9 @@ pub enum ReadError {
         problem: String,
     },
     /// A file of another program, or one that breaks off before its scene.
-    #[error("{path} is not a softjam recording: it has no {missing}")]
+    #[error(
+        "{path} is not a softjam recording, or breaks off before it says so: it has no {missing}"
+    )]
     NotSoftjam {
         /// Path of the file.
         path: String,

@@ -53,6 +53,8 @@ pub struct Recording {
 }
 
 /// Metrics by step: names and values.
+///
+/// See the example of [`Recording::next_state`].
 pub type Metrics = BTreeMap<u64, Vec<(&'static str, f64)>>;
 
 /// A recorded state, with what was recorded on the way to it.

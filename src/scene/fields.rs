@@ -101,6 +101,7 @@ impl SceneFields {
             self.species = None;
             self.spread = None;
             self.seed = None;
+            self.disks = None;
         }
         macro_rules! first_of {
             ($($field:ident),*) => { Self { $($field: flags.$field.or(self.$field)),* } };
@@ -206,11 +207,17 @@ impl SceneFields {
                     ("species", self.species.as_ref().map(|_| "[…]".to_owned())),
                     ("spread", self.spread.map(|_| "{…}".to_owned())),
                 ];
+                let disks = self.disks.filter(|d| *d != DiskParameters::default());
                 match numbers.into_iter().find_map(|(n, v)| v.map(|v| (n, v))) {
                     Some((field, value)) => Err(conflict(
                         field,
                         value,
                         "particles, radii and box come from the file",
+                    )),
+                    None if disks.is_some() => Err(conflict(
+                        "disks",
+                        "{…}".into(),
+                        "a packing from a file is relaxed as it stands, not as disks first; leave [disks] out",
                     )),
                     None => Ok(Start::File {
                         path: path.clone(),
@@ -218,15 +225,15 @@ impl SceneFields {
                     }),
                 }
             }
-            ("file", None) => Err(SceneError::Range {
+            ("file", None) => Err(SceneError::Needs {
                 field: "start".into(),
                 value: "\"file\"".into(),
-                allowed: "what can be done without file = \"PACKING.csv\"".into(),
+                needs: "the file: file = \"PACKING.csv\" (--file PACKING.csv)".into(),
             }),
             (other, _) => Err(SceneError::Range {
                 field: "start".into(),
                 value: format!("\"{other}\""),
-                allowed: "\"random\", \"hexagonal\" and \"file\"".into(),
+                allowed: "the starts that there are: \"random\", \"hexagonal\", \"file\"".into(),
             }),
         }
     }

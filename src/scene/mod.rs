@@ -19,6 +19,7 @@ mod fields;
 mod print;
 pub mod schedule;
 pub mod start;
+mod start_file;
 mod validate;
 
 pub use fields::SceneFields;
@@ -205,6 +206,13 @@ impl Default for Scene {
 }
 
 /// Why a scene makes no sense.
+///
+/// ```
+/// use softjam::scene::{Scene, SceneError};
+/// let error = Scene { phi: 1.7, ..Scene::default() }.validate().unwrap_err();
+/// assert!(matches!(&error, SceneError::Range { field, .. } if field == "phi"));
+/// assert!(error.to_string().starts_with("phi = 1.7 is outside"), "{error}");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -229,6 +237,16 @@ pub enum SceneError {
         with: String,
         /// Why not.
         why: String,
+    },
+    /// A field makes no sense without another.
+    #[error("{field} = {value} needs {needs}")]
+    Needs {
+        /// The field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What it needs.
+        needs: String,
     },
     /// The text is not a scene: a misspelt field, a value of the wrong kind, broken TOML.
     #[error("not a scene:\n{0}")]
@@ -266,7 +284,7 @@ pub enum SceneError {
         available_mib: u64,
     },
     /// The start file is not a packing.
-    #[error("start file {path}, line {line}: {problem}")]
+    #[error("start file {path}{}: {problem}", at_line(*line))]
     StartFile {
         /// Path of the file.
         path: String,
@@ -283,6 +301,14 @@ pub enum SceneError {
         /// The system's reason.
         source: std::io::Error,
     },
+}
+
+fn at_line(line: u64) -> String {
+    if line == 0 {
+        String::new()
+    } else {
+        format!(", line {line}")
+    }
 }
 
 impl Scene {
@@ -318,7 +344,7 @@ impl Scene {
             blake3: hash @ None,
         } = &mut self.start
         {
-            let bytes = start::read_file(path)?;
+            let bytes = start_file::read_file(path)?;
             *hash = Some(blake3::hash(&bytes).to_hex().to_string());
         }
         Ok(self)

@@ -8,13 +8,14 @@
 //! curve (G. M. Morton, IBM Ltd., 1966), so that particles near each other have numbers near each other and stand near
 //! each other in memory. Numbers mean nothing to the physics.
 
-use super::{Radii, Scene, SceneError, Species, Start};
+pub use super::start_file::read_csv;
+
+use super::{Radii, Scene, SceneError, Species, Start, start_file};
 use crate::domain::{Domain, Vec2};
 use crate::packing::Packing;
 use core::f64::consts::PI;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::io::Read as _;
 
 /// The packing that a scene starts from, its disks not yet relaxed.
 ///
@@ -33,7 +34,7 @@ use std::io::Read as _;
 /// ```
 pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
     let packing = match &scene.start {
-        Start::File { path, blake3 } => read_csv(path, blake3.as_deref())?,
+        Start::File { path, blake3 } => return start_file::of_scene(path, blake3.as_deref()),
         Start::Random => {
             let mut random = Random::new(scene.seed);
             let radii = radii(scene, &mut random);
@@ -78,15 +79,14 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
         }
     };
     let (l, largest_radius) = (packing.domain().lengths(), packing.largest_radius());
-    let (phi, aspect) = match scene.start {
-        Start::Random => (scene.phi, scene.aspect),
-        Start::Hexagonal => (scene.phi, l.x / l.y),
-        Start::File { .. } => (packing.coverage(), l.x / l.y),
+    let aspect = match scene.start {
+        Start::Hexagonal => l.x / l.y,
+        Start::Random | Start::File { .. } => scene.aspect,
     };
-    if packing.domain().shortest() < 5.0 * largest_radius {
+    if is_small(&packing) {
         return Err(SceneError::BoxTooSmall {
             particles: packing.len(),
-            phi,
+            phi: scene.phi,
             aspect,
             length_x: l.x,
             length_y: l.y,
@@ -94,6 +94,11 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
         });
     }
     Ok(packing)
+}
+
+/// Whether the box is too small for the nearest image to be the only one that counts.
+pub(super) fn is_small(packing: &Packing) -> bool {
+    packing.domain().shortest() < 5.0 * packing.largest_radius()
 }
 
 /// The place of a point of the box along Morton's curve through 2¹⁶ × 2¹⁶ squares: the bits of the square's column and
@@ -205,134 +210,6 @@ impl Random {
             items.swap(k, other.min(k));
         }
     }
-}
-
-/// A packing from a CSV file.
-///
-/// The header is `x,y,radius`, one line a particle follows; a comment line `# box = L_x, L_y` gives the sides of the
-/// periodic box. Lengths in one unit of your choice (the default mixture uses the small diameter). With `blake3`, the
-/// file must have that BLAKE3 in hexadecimal.
-///
-/// ```text
-/// # box = 12.5, 12.5
-/// x,y,radius
-/// 0.31,7.25,0.5
-/// 1.40,7.01,0.7
-/// ```
-///
-/// # Errors
-///
-/// [`SceneError::Read`] if the file cannot be read, [`SceneError::StartFile`] names the line that is wrong.
-///
-/// # Example
-///
-/// ```
-/// use softjam::scene::start::read_csv;
-///
-/// let path = std::env::temp_dir().join("softjam-read-csv-example.csv");
-/// std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n2,1,0.7\n").unwrap();
-/// let packing = read_csv(path.to_str().unwrap(), None).unwrap();
-/// assert_eq!(packing.radii(), [0.5, 0.7]);
-/// # std::fs::remove_file(&path).unwrap();
-/// ```
-pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
-    let bytes = read_file(path)?;
-    let wrong = |line: u64, problem: String| SceneError::StartFile {
-        path: path.into(),
-        line,
-        problem,
-    };
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(wrong(0, format!("it is longer than {LARGEST_FILE} bytes")));
-    }
-    let found = blake3::hash(&bytes).to_hex();
-    if let Some(asked) = blake3
-        && !asked.eq_ignore_ascii_case(&found)
-    {
-        return Err(wrong(
-            0,
-            format!(
-                "its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"
-            ),
-        ));
-    }
-    let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let domain = csv_box(text).map_err(|(line, problem)| wrong(line, problem))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let header = reader.headers().map_err(|e| wrong(1, e.to_string()))?;
-    if header != ["x", "y", "radius"].as_slice() {
-        let found: Vec<_> = header.iter().collect();
-        return Err(wrong(
-            1,
-            format!("the header is `{}`, not `x,y,radius`", found.join(",")),
-        ));
-    }
-    let (mut positions, mut radii) = (Vec::new(), Vec::new());
-    for record in reader.deserialize::<(f64, f64, f64)>() {
-        let (x, y, radius) = record.map_err(|e| {
-            let line = e.position().map_or(0, csv::Position::line);
-            wrong(line, format!("three numbers x,y,radius are expected: {e}"))
-        })?;
-        positions.push(Vec2::new(x, y));
-        radii.push(radius);
-    }
-    let packing =
-        Packing::new(domain, radii, positions).map_err(|error| wrong(0, error.to_string()))?;
-    let phi = packing.coverage();
-    if !(phi > 0.0 && phi < 1.3) {
-        return Err(wrong(
-            0,
-            format!("phi = {phi} is outside 0 < phi < 1.3 (coverage of the undeformed disks)"),
-        ));
-    }
-    Ok(packing)
-}
-
-/// A start file of the largest packing is about half as long.
-const LARGEST_FILE: u64 = 1 << 30;
-
-/// The bytes of a start file, one more than [`LARGEST_FILE`] at most.
-pub(super) fn read_file(path: &str) -> Result<Vec<u8>, SceneError> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(|source| SceneError::Read {
-            path: path.into(),
-            source,
-        })?;
-    Ok(bytes)
-}
-
-/// The sides of the box from the comment `# box = L_x, L_y`.
-fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
-    for (number, line) in (1..).zip(text.lines()) {
-        let Some(comment) = line.trim().strip_prefix('#') else {
-            continue;
-        };
-        let Some((name, value)) = comment.split_once('=') else {
-            continue;
-        };
-        if name.trim() != "box" {
-            continue;
-        }
-        let sides: Result<Vec<f64>, _> = value.split(',').map(|s| s.trim().parse()).collect();
-        return match sides.as_deref() {
-            Ok([x, y]) => Domain::new(*x, *y),
-            _ => None,
-        }
-        .ok_or_else(|| {
-            let problem = format!("`{}` does not give two positive sides", line.trim());
-            (number, problem)
-        });
-    }
-    Err((
-        0,
-        "no comment `# box = L_x, L_y` gives the periodic box".into(),
-    ))
 }
 
 #[cfg(test)]

@@ -89,8 +89,11 @@ fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
     };
     // The line of contact lies in the middle; the bulges around it reach no farther than the linear model says.
     let contour = rightmost(&drawn(Shape::Contour));
-    let disk = rightmost(&drawn(Shape::Disk));
-    assert!((disk - (14.0 + 510.0)).abs() < 0.05, "{disk}");
+    let disk = 14.0 + 510.0;
+    let disks = drawn(Shape::Disk);
+    let left = disks.matches("<circle cx=\"474\" cy=\"514\"").count();
+    assert_eq!(left, 2, "a filled disk, and its outline above all disks");
+    assert!(disks.contains("r=\"50\""), "{disks}");
     assert!(contour < disk - 5.0 && contour > 14.0 + 495.0, "{contour}");
     let svg = drawn(Shape::Contour);
     assert_eq!(svg.matches("<line").count(), 1, "one contact, one chain");
@@ -135,6 +138,7 @@ fn the_fall_of_f_max_keeps_zero_and_huge_runs_on_the_sheet() {
     let fall = |points| Fall {
         label: "a < b & c".to_owned(),
         points,
+        threshold: None,
     };
     let long: Vec<(u64, f64)> = (0..100_000).map(|k| (k, 1.0 / (1.0 + k as f64))).collect();
     let svg = relaxation(&[fall(long), fall(vec![(0, 1.0), (5, 0.0)]), fall(vec![])]).unwrap();

@@ -13,6 +13,8 @@
 )]
 
 mod common;
+#[cfg(feature = "cli")]
+mod examples;
 #[cfg(feature = "figure")]
 mod figures;
 #[cfg(feature = "recording")]

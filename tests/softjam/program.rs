@@ -1,6 +1,7 @@
 //! The program at its process boundary: exit codes, files, messages.
 
 mod convert;
+mod help;
 mod live;
 mod replay;
 

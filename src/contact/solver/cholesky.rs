@@ -10,9 +10,7 @@ use crate::simplicial::Simplicial;
 /// The factorisation is the simplicial one, without threads: its sums have one order on every machine. The supernodal
 /// one would pick its kernels by the CPU.
 ///
-/// # Example
-///
-/// See [`LinearSolver`](super::LinearSolver).
+/// See the example of [`LinearSolver`](super::LinearSolver).
 #[derive(Clone, Debug, Default)]
 pub struct SparseCholesky {
     /// Lower triangle by columns: pointers, rows (ascending) and values.

@@ -6,9 +6,7 @@ use crate::contact::matrix::ContactMatrix;
 /// Conjugate gradients with the diagonal as preconditioner; owns its vectors, so a solve allocates nothing once they are
 /// long enough.
 ///
-/// # Example
-///
-/// See [`LinearSolver`](super::LinearSolver); this is its default.
+/// See the example of [`LinearSolver`](super::LinearSolver); this is its default.
 #[derive(Clone, Debug, Default)]
 pub struct ConjugateGradient {
     residual: Vec<f64>,

@@ -8,9 +8,7 @@ use crate::contact::matrix::ContactMatrix;
 /// A yardstick and a cross-check, not a way to run: at 1000 contacts it needs a thousand times the work of the other
 /// solvers.
 ///
-/// # Example
-///
-/// See [`LinearSolver`](super::LinearSolver).
+/// See the example of [`LinearSolver`](super::LinearSolver).
 #[derive(Clone, Debug, Default)]
 pub struct GaussJordan {
     dense: Vec<f64>,

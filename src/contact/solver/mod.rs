@@ -38,6 +38,24 @@ pub enum Method {
 }
 
 /// Why `A f = δ` was not solved.
+///
+/// ```
+/// use softjam::contact::{list::ContactList, matrix::{ContactMatrix, Geometry}};
+/// use softjam::contact::solver::{LinearSolver, Method, SolverError};
+/// use softjam::domain::{Domain, Vec2};
+/// use softjam::packing::Packing;
+///
+/// let at = |x, y| Vec2::new(x, y);
+/// let positions = vec![at(1.0, 2.0), at(1.9, 2.0), at(2.8, 2.1)];
+/// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5, 0.5, 0.6], positions).unwrap();
+/// let contacts = ContactList::new(3, &[[0, 1], [1, 2]]).unwrap();
+/// let geometry = Geometry::of(&packing, &contacts);
+/// let matrix = ContactMatrix::of(&packing, &contacts, &geometry, 1.0);
+/// // An overlap that is no number has no forces, and nothing hangs over it.
+/// let mut solver = LinearSolver::new(Method::ConjugateGradient);
+/// let error = solver.solve(&matrix, &[f64::NAN, 0.1], &mut [0.0; 2], 1e-12).unwrap_err();
+/// assert!(matches!(error, SolverError::NotConverged { .. } | SolverError::NotPositiveDefinite { .. }), "{error}");
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolverError {

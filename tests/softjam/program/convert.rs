@@ -85,7 +85,7 @@ fn what_convert_cannot_do_is_said_before_a_file_is_made() {
     record(folder.path(), "m.rrd", &["--channels", "metrics,contours"]);
     std::fs::write(folder.path().join("text.rrd"), "not a recording").expect("written");
     let cases: [(&[&str], i32, &str); 6] = [
-        (&["a.rrd", "a.rrd"], 2, "is an input of this run"),
+        (&["a.rrd", "a.rrd"], 2, "is what is read from"),
         (&["a.rrd", "m.rrd"], 2, "m.rrd exists"),
         (&["m.rrd", "x.mcap"], 2, "--channels metrics"),
         (&["text.rrd", "x.mcap"], 1, "is not a recording"),

@@ -22,12 +22,11 @@ fn complaint(bytes: &[u8]) -> String {
         Ok(_) => panic!("{:?} passed", String::from_utf8_lossy(bytes)),
         Err(error) => error.to_string(),
     };
-    if !message.contains("largest radius") {
-        assert!(
-            message.starts_with(&format!("start file {path}, line ")),
-            "{message}"
-        );
-    }
+    assert!(
+        message.starts_with(&format!("start file {path}")),
+        "{message}"
+    );
+    assert!(!message.contains("line 0"), "{message}");
     message
 }
 
@@ -69,8 +68,8 @@ fn box_that_is_missing_or_no_rectangle_is_quoted_with_its_line() {
     assert_all_refused(
         "",
         "
-                                            => line 0 & # box = L_x, L_y
-        # a packing                         => line 0 & # box = L_x, L_y
+                                            => # box = L_x, L_y
+        # a packing                         => # box = L_x, L_y
         # box = 6                           => line 1 & `# box = 6`
         # box = -6, 6                       => line 1 & `# box = -6, 6`
         # box = 0, 6                        => line 1 & `# box = 0, 6`
@@ -105,7 +104,7 @@ fn header_that_is_missing_or_another_is_quoted() {
                                             => `x,y,radius`
         x,y,r / 1,1,0.5                     => `x,y,r` & `x,y,radius`
         radius,x,y / 1,1,0.5                => `radius,x,y`
-        x,y / 1,1                           => `x,y`,
+        x,y / 1,1                           => `x,y` & `x,y,radius`
         1,1,0.5                             => `1,1,0.5`
         ",
         "\n",
@@ -122,8 +121,9 @@ fn rows_that_are_no_particle_are_named() {
         1,1,0.5 / 2,,0.5                    => line 4 & three numbers x,y,radius
         1,1,0.5 / 2,1                       => line 4
         1,1,0.5 / 2,1,0.5,7                 => line 4
-        1,1,-0.5                            => radius -0.5 of particle 0
-        1,1,0.5 / 3,1,0                     => radius 0 of particle 1
+        1,1,0.5 /  / # two / 2,one,0.5      => line 6 & `2,one,0.5` is not three numbers x,y,radius
+        1,1,-0.5                            => line 3 & radius -0.5 of particle 0
+        1,1,0.5 /  / 3,1,0                  => line 5 & radius 0 of particle 1
         1,1,nan                             => radius NaN of particle 0
         1,1,inf                             => radius inf of particle 0
         1,1,0.5 / 3,nan,0.5                 => position (3, NaN) of particle 1

@@ -1,0 +1,69 @@
+//! Rows of lossless states, gathered component by component.
+
+use super::cells::{Cells, own};
+use super::columns::Column;
+use crate::domain::Vec2;
+use crate::frame::Frame;
+use std::io;
+
+/// `softjam.State` rows in the making.
+#[derive(Default)]
+pub(super) struct StateRows {
+    /// Step and simulated time in nanoseconds of each row.
+    pub times: Vec<(u64, i64)>,
+    positions: Cells<f64, 2>,
+    velocities: Cells<f64, 2>,
+    contacts: Cells<u32, 2>,
+    forces: Cells<f64, 1>,
+    minimizers: Cells<f64, 1>,
+    digests: Cells<u8, 1>,
+}
+
+impl StateRows {
+    /// Room for as much as `other` holds: one batch is like the next.
+    pub fn with_room_of(other: &Self) -> Self {
+        Self {
+            times: Vec::with_capacity(other.times.len()),
+            positions: Cells::with_room_of(&other.positions),
+            velocities: Cells::with_room_of(&other.velocities),
+            contacts: Cells::with_room_of(&other.contacts),
+            forces: Cells::with_room_of(&other.forces),
+            minimizers: Cells::with_room_of(&other.minimizers),
+            digests: Cells::with_room_of(&other.digests),
+        }
+    }
+
+    /// Adds the state of a frame and its digest.
+    pub fn row(&mut self, nanoseconds: i64, frame: &Frame, digest: &[u8; 32]) {
+        let components = |v: &Vec2| [v.x, v.y];
+        self.times.push((frame.step, nanoseconds));
+        self.positions
+            .extend(frame.positions.iter().map(components));
+        self.velocities
+            .extend(frame.velocities.iter().map(components));
+        self.contacts.extend(frame.contacts.iter().copied());
+        self.forces.extend(frame.forces.iter().map(|f| [*f]));
+        self.minimizers
+            .extend(frame.minimizer.values().into_iter().map(|x| [x]));
+        self.digests.extend(digest.map(|byte| [byte]));
+        self.positions.end_row();
+        self.velocities.end_row();
+        self.contacts.end_row();
+        self.forces.end_row();
+        self.minimizers.end_row();
+        self.digests.end_row();
+    }
+
+    /// The components of all rows.
+    pub fn into_columns(self) -> io::Result<Vec<Column>> {
+        Ok(vec![
+            self.positions.into_column(own("softjam.State:position"))?,
+            self.velocities.into_column(own("softjam.State:velocity"))?,
+            self.contacts.into_column(own("softjam.State:contact"))?,
+            self.forces.into_column(own("softjam.State:force"))?,
+            self.minimizers
+                .into_column(own("softjam.State:minimizer"))?,
+            self.digests.into_column(own("softjam.State:digest"))?,
+        ])
+    }
+}
