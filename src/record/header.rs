@@ -151,7 +151,7 @@ fn text(header: &Header) -> String {
         parts.push("| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
              | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
              | gray | rattler: fewer than three contacts that bear a force |\n\
-             | disk in it | hover it for its number, p (γ/length), number of contacts Z, max abs ΔR/R |\n\
+             | disk in it | hover it for its number, p (γ/length), number of contacts Z, deepest dent −ΔR/R |\n\
              | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n".to_owned());
     }
     if channels.contacts.is_on() {

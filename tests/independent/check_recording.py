@@ -223,7 +223,7 @@ def rattles(n, contacts):
         alive &= ~loose
 
 
-def check_beside(recording, step, state, gamma, single):
+def check_beside(recording, step, state, around, gamma, single):
     """What stands beside contours and contacts; the number of images, and the largest relative error of a number."""
     positions, contacts, forces = state
     radii, box, n = recording.radii, recording.box, len(recording.radii)
@@ -253,10 +253,11 @@ def check_beside(recording, step, state, gamma, single):
         z = np.bincount(contacts.ravel(), minlength=n)
         for p, (text, rattler) in enumerate(zip(numbers.as_py(), rattles(n, contacts))):
             words = text.replace(",", "").split()
-            if words[:5:2] != ["p", "Z", "ΔR/R"] or words[3] != str(z[p]) or ("rattler" in words) != rattler:
+            if words[:5:2] != ["p", "Z", "dent"] or words[3] != str(z[p]) or ("rattler" in words) != rattler:
                 sys.exit(f"step {step}, particle {p}: {text!r}; Z is {z[p]}, rattler: {rattler}")
-            strain = np.abs(np.hypot(*(strips[p] - positions[p]).T) / radii[p] - 1).max()
-            for printed, value, slack in ((words[1], pressure[p], 0), (words[5], strain, 4 * single)):
+            # At the contacts, where the contour of the linear model is deepest.
+            dent = max([0.0] + [-sum(forces[k] * g(a - b) for b, k in around[p]) / (2 * np.pi * gamma) for a, _ in around[p]])
+            for printed, value, slack in ((words[1], pressure[p], 0), (words[5], dent, 0)):
                 # Three digits.
                 worst = max(worst, (abs(float(printed) - value) - 0.00501 * value - slack) / max(value, 1e-300))
         count += images(strips, cells["/world/contours/images"], box, single, lambda s: s)
@@ -291,7 +292,7 @@ def main():
             vertices += sum(len(s) for s in strips)
             contour = check_contours(recording, state, found["around"], strips, gamma)
             worst["contour"] = max(worst["contour"], contour)
-        more, beside = check_beside(recording, step, state, gamma, single)
+        more, beside = check_beside(recording, step, state, found["around"], gamma, single)
         count, worst["beside"] = count + more, max(worst["beside"], beside)
     limits = {
         "eq4": (1.0, "eq. (4), |A f - delta| over what the frame's f_max allows"),
