@@ -14,7 +14,7 @@ use std::io::{self, Write};
 
 /// The radius of a particle's point, in radii of the smallest particle: one size for all, so that it is not taken for the
 /// particle.
-const POINT: f64 = 0.8;
+const POINT: f64 = 0.9;
 
 /// Writes the header into a store.
 pub(super) fn write<W: Write>(
@@ -115,7 +115,7 @@ fn text(header: &Header) -> String {
         0 => String::new(),
         step => format!(" The recording begins with step {step}."),
     };
-    let mut text = format!(
+    let mut parts = vec![format!(
         "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
          {:.3} × {:.3}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
          {PROGRAM}.\n\n",
@@ -125,7 +125,7 @@ fn text(header: &Header) -> String {
         l.y,
         scene.line_tension,
         scene.threshold,
-    );
+    )];
     let channels = &scene.channels;
     let missing: Vec<&str> = [
         ("contours", channels.contours),
@@ -141,24 +141,25 @@ fn text(header: &Header) -> String {
         } else {
             ""
         };
-        text += &format!(
-            "**This recording has no {}**{how}.\n\n",
-            missing.join(", no ")
-        );
+        let missing = missing.join(", no ");
+        parts.push(format!("**This recording has no {missing}**{how}.\n\n"));
     }
     if channels.contours.is_on() || channels.contacts.is_on() {
-        text += "| in the picture | |\n| --- | --- |\n";
+        parts.push("| in the picture | |\n| --- | --- |\n".to_owned());
     }
     if channels.contours.is_on() {
-        text += "| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
+        parts.push("| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
              | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
              | gray | rattler: fewer than three contacts that bear a force |\n\
-             | disk in it | hover it for its number, p (γ/length), number of contacts Z, max abs ΔR/R |\n\
-             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n";
+             | disk in it | hover it for its number, p (γ/length), number of contacts Z, deepest dent −ΔR/R |\n\
+             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n".to_owned());
     }
     if channels.contacts.is_on() {
-        text += "| line | contact; width and colour: force f over the mean (inferno, 0 to 3); click it for its pair, f (γ) and overlap δ |\n";
+        parts.push("| line | contact; width and colour: force f over the mean (inferno, 0 to 3); click it for its pair, f (γ) and overlap δ |\n".to_owned());
     }
-    text += &format!("\nThe whole scene:\n\n```toml\n{}```\n", scene.to_toml());
-    text
+    parts.push(format!(
+        "\nThe whole scene:\n\n```toml\n{}```\n",
+        scene.to_toml()
+    ));
+    parts.concat()
 }

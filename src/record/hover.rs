@@ -34,7 +34,7 @@ impl ParticleRows {
     }
 
     /// Adds the next particle, at `centre` and with its deepest dent relative to its undeformed radius: `p 0.125, Z 5,
-    /// ΔR/R 0.0346`; `line_tension` is γ.
+    /// dent 0.0346`; `line_tension` is γ.
     pub fn particle(
         &mut self,
         particles: &Particles,
@@ -51,7 +51,7 @@ impl ParticleRows {
         numbers.push_number(particles.pressure[p] / line_tension);
         numbers.push(", Z ");
         numbers.push_count(particles.contacts[p]);
-        numbers.push(", ΔR/R ");
+        numbers.push(", dent ");
         numbers.push_number(deepest);
         if !particles.held[p] {
             numbers.push(", rattler");

@@ -6,7 +6,7 @@
 //! | `/world`, `/world/box`, `/world/legend` | y up; the periodic box; what colours and widths mean |
 //! | `/world/contours` | particle polygons, coloured by the pressure `p_i = Σ_j f_ij / 2πR_i` on the particle |
 //! | `/world/contours/images` | those that cross an edge, at its other side; `softjam.Image:particle` is the particle |
-//! | `/world/particles` | a point a particle; `softjam.Particle:numbers` says `p_i` (γ/length), the number of contacts `Z` with `f > 0`, `max abs ΔR/R`, and whether it rattles |
+//! | `/world/particles` | a point a particle; `softjam.Particle:numbers` says `p_i` (γ/length), the number of contacts `Z` with `f > 0`, its deepest dent `−min ΔR/R` at a contact, and whether it rattles |
 //! | `/world/disks` | the undeformed disks of the frame, hidden until asked for |
 //! | `/world/contacts` | a segment a contact between the centres, width and colour by the force; `softjam.Contact:pair`, `:force` (γ), `:overlap` (`δ_ij`, length) |
 //! | `/world/contacts/images` | those that cross an edge, at its other side; `softjam.Image:contact` is the contact |

@@ -7,6 +7,7 @@ For every recorded state (or every K-th, with --every K):
   balance        the largest net force, against the recorded f_max
   pressure, U    from forces and distances, against the recorded metrics
   contours       every vertex against rho_i(theta) at its own angle
+  beside them    periodic images of contours and contacts, undeformed disks, the numbers of particles and contacts
 
 usage: check_recording.py RUN.rrd [--every K]      (pip install rerun-sdk==0.36.3 numpy)
 """
@@ -31,9 +32,20 @@ def dg(theta):
     return (np.pi - t) * np.cos(t) - 0.5 * np.sin(t)
 
 
+# What stands beside the contours and the contacts, by entity.
+BESIDE = {
+    "/world/contours/images": ("softjam.Image:particle", "LineStrips2D:strips"),
+    "/world/particles": ("Points2D:positions", "softjam.Particle:numbers"),
+    "/world/disks": ("Ellipses2D:centers",),
+    "/world/contacts": ("softjam.Contact:pair", "softjam.Contact:force", "softjam.Contact:overlap"),
+    "/world/contacts/images": ("softjam.Image:contact", "LineStrips2D:strips"),
+}
+
+
 class Recording:
     def __init__(self, path):
         self.states, self.contours, self.metrics = {}, {}, {}
+        self.beside = {entity: {} for entity in BESIDE}
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch = chunk.to_record_batch()
             entity = str(chunk.entity_path)
@@ -43,6 +55,9 @@ class Recording:
                 self.gradient = scene.get("forces", "central") == "gradient"
                 self.threshold, self.tolerance = scene["threshold"], scene["contact_tolerance"]
                 self.seed_rule = scene["contact_rule"] == "seed"
+            if entity in BESIDE and not chunk.is_static:
+                columns = [batch[name] for name in BESIDE[entity]]
+                self.beside[entity] |= dict(zip(batch["step"].to_pylist(), zip(*columns)))
             if entity == "/particles":
                 self.radii = batch["softjam.Particles:radius"][0].values.to_numpy()
                 self.box = batch["softjam.Particles:box"][0].values.to_numpy()
@@ -165,6 +180,90 @@ def check_contours(recording, state, around, strips, gamma):
     return worst
 
 
+def periods(points, box, single):
+    """Which of the eight shifts bring a point into the box for certain, and which do so if rounding helps."""
+    certain, possible = set(), set()
+    for x in (-1, 0, 1):
+        for y in (-1, 0, 1):
+            v = points + np.array([x, y]) * box
+            if x or y:
+                if ((v > single) & (v < box - single)).all(axis=1).any():
+                    certain.add((x, y))
+                if ((v > -single) & (v < box + single)).all(axis=1).any():
+                    possible.add((x, y))
+    return certain, possible
+
+
+def images(whole, cell, box, single, dense):
+    """Checks images against `whole`, the shapes that they are images of; how many there are."""
+    numbers, strips = (c.as_py() for c in cell)
+    found = [set() for _ in whole]
+    for number, strip in zip(numbers, strips):
+        moved = np.asarray(strip) - whole[number]
+        shift = np.rint(moved[0] / box)
+        if np.abs(moved - shift * box).max() > 2 * single:
+            sys.exit(f"an image of {number} is not it, moved by a period")
+        if tuple(shift) in found[number]:
+            sys.exit(f"an image of {number} is there twice")
+        found[number].add(tuple(shift))
+    for number, shape in enumerate(whole):
+        certain, possible = periods(dense(shape), box, single)
+        if not certain <= found[number] <= possible:
+            sys.exit(f"images of {number}: {found[number]}, not {certain}")
+    return len(numbers)
+
+
+def rattles(n, contacts):
+    alive = np.ones(n, dtype=bool)
+    while True:
+        among = contacts[alive[contacts].all(axis=1)]
+        loose = alive & (np.bincount(among.ravel(), minlength=n) < 3)
+        if not loose.any():
+            return ~alive
+        alive &= ~loose
+
+
+def check_beside(recording, step, state, around, gamma, single):
+    """What stands beside contours and contacts; the number of images, and the largest relative error of a number."""
+    positions, contacts, forces = state
+    radii, box, n = recording.radii, recording.box, len(recording.radii)
+    cells = {entity: rows[step] for entity, rows in recording.beside.items() if step in rows}
+    i, j = contacts[:, 0].astype(int), contacts[:, 1].astype(int)
+    d = nearest(positions[i] - positions[j], box)
+    count, worst = 0, 0.0
+    if "/world/contacts" in cells:
+        pair, force, overlap = cells["/world/contacts"]
+        if not np.array_equal(flat(pair), contacts):
+            sys.exit(f"step {step}: the contacts of the picture are not those of the state")
+        delta = radii[i] + radii[j] - np.hypot(d[:, 0], d[:, 1])
+        worst = max(np.abs(force.values.to_numpy() / (forces / gamma) - 1).max(initial=0), worst)
+        worst = max(np.abs(overlap.values.to_numpy() - delta).max(initial=0), worst)
+        ends = list(np.stack([positions[i], positions[i] - d], axis=1))
+        along = np.linspace(0, 1, 2001)[:, None]
+        dense = lambda s: s[0] + along * (s[1] - s[0])
+        count += images(ends, cells["/world/contacts/images"], box, max(single, 1e-3), dense)
+    if "/world/particles" in cells:
+        drawn, numbers = cells["/world/particles"]
+        (centers,) = cells["/world/disks"]
+        for places in (drawn, centers):
+            if not np.array_equal(flat(places), positions.astype(np.float32)):
+                sys.exit(f"step {step}: disks are not at the positions")
+        strips = [np.asarray(s) for s in recording.contours[step].as_py()]
+        pressure = np.bincount(contacts.ravel(), np.repeat(forces / gamma, 2), n) / (2 * np.pi * radii)
+        z = np.bincount(contacts.ravel(), minlength=n)
+        for p, (text, rattler) in enumerate(zip(numbers.as_py(), rattles(n, contacts))):
+            words = text.replace(",", "").split()
+            if words[:5:2] != ["p", "Z", "dent"] or words[3] != str(z[p]) or ("rattler" in words) != rattler:
+                sys.exit(f"step {step}, particle {p}: {text!r}; Z is {z[p]}, rattler: {rattler}")
+            # At the contacts, where the contour of the linear model is deepest.
+            dent = max([0.0] + [-sum(forces[k] * g(a - b) for b, k in around[p]) / (2 * np.pi * gamma) for a, _ in around[p]])
+            for printed, value, slack in ((words[1], pressure[p], 0), (words[5], dent, 0)):
+                # Three digits.
+                worst = max(worst, (abs(float(printed) - value) - 0.00501 * value - slack) / max(value, 1e-300))
+        count += images(strips, cells["/world/contours/images"], box, single, lambda s: s)
+    return count, worst
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("path")
@@ -174,8 +273,10 @@ def main():
     gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
-    worst = dict.fromkeys(("eq4", "gap", "force", "f_max", "pressure", "energy", "contour"), 0.0)
-    vertices = 0
+    worst = dict.fromkeys(("eq4", "gap", "force", "f_max", "pressure", "energy", "contour", "beside"), 0.0)
+    vertices, count = 0, 0
+    # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
+    single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
     for step in steps:
         state = recording.states[step]
         found = check_state(recording, state, gamma)
@@ -191,8 +292,8 @@ def main():
             vertices += sum(len(s) for s in strips)
             contour = check_contours(recording, state, found["around"], strips, gamma)
             worst["contour"] = max(worst["contour"], contour)
-    # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
-    single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
+        more, beside = check_beside(recording, step, state, found["around"], gamma, single)
+        count, worst["beside"] = count + more, max(worst["beside"], beside)
     limits = {
         "eq4": (1.0, "eq. (4), |A f - delta| over what the frame's f_max allows"),
         "gap": (1.0, "overlap of pairs that are not contacts over what f_max allows"),
@@ -201,6 +302,7 @@ def main():
         "pressure": (1e-9, "pressure against the recorded one"),
         "energy": (1e-9, "energy against the recorded one"),
         "contour": (single, f"contour vertex off rho(theta), {vertices} vertices"),
+        "beside": (2e-7, f"numbers of particles and contacts, beside {count} periodic images"),
     }
     last = steps[-1]
     print(f"{arguments.path}: {len(steps)} states up to step {last}, recorded f_max = {recording.metrics['f_max'][last]:.3e}")

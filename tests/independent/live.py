@@ -81,7 +81,7 @@ def record(*arguments, env=None):
 def rows(path):
     """Every row of the recording, by entity and step (None: static), as the bytes of its columns."""
     found = {}
-    kinds = ("softjam.", "LineStrips2D:", "Scalars:", "TextDocument:", "Transform3D:")
+    kinds = ("softjam.", "LineStrips2D:", "Points2D:", "Ellipses2D:", "Scalars:", "TextDocument:", "Transform3D:")
     for chunk in rerun.RrdReader(path).stream().to_chunks():
         batch = chunk.to_record_batch()
         names = [n for n in batch.schema.names if n.startswith(kinds)]
