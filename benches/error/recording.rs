@@ -42,7 +42,7 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
         );
         return Ok(table);
     }
-    let (particles, steps, rounds) = if quick { (64, 50, 1) } else { (1024, 500, 3) };
+    let (particles, steps, rounds) = if quick { (64, 50, 1) } else { (1024, 2000, 3) };
     let mut alone = Vec::new();
     let mut recorded: Vec<Vec<(f64, f64)>> = vec![Vec::new(); CHANNELS.len()];
     for _ in 0..rounds {
