@@ -6,7 +6,7 @@ use crate::common::{
     solved,
 };
 use proptest::prop_assert;
-use proptest::test_runner::{Config, TestCaseError, TestRunner};
+use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
 use softjam::contact::solver::Method;
 use softjam::contact::{ContactError, ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
@@ -26,6 +26,17 @@ fn packings() -> Vec<Packing> {
     list
 }
 
+/// Whether two disks overlap by more than the radius of one of them.
+fn nested(packing: &Packing) -> bool {
+    let (radii, positions) = (packing.radii(), packing.positions());
+    (0..packing.len()).any(|i| {
+        (0..i).any(|j| {
+            let separation = packing.domain().minimum_image(positions[i] - positions[j]);
+            separation.norm() < radii[i].max(radii[j])
+        })
+    })
+}
+
 #[test]
 fn forces_and_gaps_are_never_negative_and_never_both_positive() {
     let config = Config {
@@ -33,6 +44,8 @@ fn forces_and_gaps_are_never_negative_and_never_both_positive() {
         // A refused packing does not count: 60 are solved, or the test fails.
         max_global_rejects: 600,
         failure_persistence: None,
+        // The same cases every time.
+        rng_seed: RngSeed::Fixed(1),
         ..Config::default()
     };
     let cases = (
@@ -52,6 +65,10 @@ fn forces_and_gaps_are_never_negative_and_never_both_positive() {
                 Err(ContactError::BoxTooSmall { .. }) => {
                     refused.set(refused.get() + 1);
                     return Err(TestCaseError::reject("box too small"));
+                }
+                // Forces may be called absurd only of a start in which disks lie in each other.
+                Err(ContactError::Absurd { .. }) if nested(&packing) => {
+                    return Err(TestCaseError::reject("disks lie in each other"));
                 }
                 Err(error) => return Err(TestCaseError::fail(error.to_string())),
                 Ok(()) => {}
