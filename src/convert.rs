@@ -25,8 +25,7 @@
 //! ```
 
 use crate::domain::Vec2;
-use crate::force::Backbone;
-use crate::force::{METRICS, Metrics};
+use crate::force::{Backbone, METRICS, Metrics};
 use crate::frame::Frame;
 use crate::record::{Header, Outcome, RecordError, Snapshot, Writer, Written, nanoseconds};
 use crate::relax::{RelaxError, Relaxation};

@@ -62,13 +62,8 @@ pub(super) fn write<W: Write>(
     if channels.contours.is_on() {
         put("/world/contours", &outline(1.3, 20.0))?;
         put("/world/contours/images", &outline(0.9, 15.0))?;
-        let least = packing
-            .radii()
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
         let points = Points2D::update_fields()
-            .with_radii([(POINT * least) as f32])
+            .with_radii([(POINT * packing.smallest_radius()) as f32])
             .with_draw_order(10.0);
         put("/world/particles", &points)?;
         let radii = packing.radii().iter().map(|r| [*r as f32; 2]);

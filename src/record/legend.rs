@@ -15,7 +15,7 @@ pub(super) fn write(
 ) -> io::Result<()> {
     let (packing, channels) = (&header.packing, &header.scene.channels);
     let l = packing.domain().lengths().map(|x| x as f32);
-    let largest = packing.radii().iter().copied().fold(0.0, f64::max) as f32;
+    let largest = packing.largest_radius() as f32;
     // What belongs to a particle in the box reaches no further than this beyond its edge.
     let margin = 2.2 * largest;
     // All of it has one height; the two parts stand above each other in the upper and in the lower half.

@@ -11,8 +11,9 @@ use std::thread::JoinHandle;
 /// Snapshots that may wait for the disk before the run does.
 const QUEUE: usize = 8;
 
-/// Snapshots without a frame that are handed over together: waking the thread costs more than the metrics of a step.
-const TOGETHER: usize = 64;
+/// Snapshots without a frame are handed over together until they span so many steps: waking the thread costs more than the
+/// metrics of a step.
+const TOGETHER: u64 = 64;
 
 /// A recording in the making: takes snapshots, encodes and writes them on a thread of its own.
 ///
@@ -136,9 +137,10 @@ impl Writer {
     /// See the example of the [module](super).
     pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
         let snapshot = snapshot.into();
-        let small = snapshot.frame.is_none();
+        let first = self.held.first().map_or(snapshot.step, |held| held.step);
+        let waits = snapshot.frame.is_none() && snapshot.step.saturating_sub(first) < TOGETHER;
         self.held.push(snapshot);
-        if small && self.held.len() < TOGETHER {
+        if waits {
             return Ok(());
         }
         self.hand_over()

@@ -158,14 +158,15 @@ impl Scene {
     /// ```
     #[must_use]
     pub fn memory_estimate(&self, particles: usize) -> u64 {
-        // Measured (growth of the peak resident size from N = 20 000 to 40 000 at φ = 0.86): 1.0 kB a particle with
-        // metrics alone, 4.2 kB when every step is recorded with 32 vertices. The estimate is about twice that or more: the
-        // queue may fill up, and contacts grow with φ.
+        // Measured (growth of the peak resident size from N = 20 000 to 40 000, every step recorded with 32 vertices, at
+        // φ = 0.86 and 1.2): 1.3 and 2.7 kB a particle with metrics alone, 3.3 and 5.1 kB with contacts and state as well,
+        // 5.2 and 6.7 kB with contours too. The estimate is half as much again and more: the queue may fill up.
         let vertices = if self.channels.contours.is_on() {
             self.contours.vertices as u64 + 8
         } else {
             0
         };
+        let frames = self.channels.contacts.is_on() || self.channels.state.is_on();
         let n = particles as u64;
         let dense = if self.contact_solver == Method::GaussJordan {
             // The dense matrix of some 2.5 N contacts.
@@ -173,7 +174,7 @@ impl Scene {
         } else {
             0
         };
-        n * (4_000 + 24 * 4 * vertices) + dense
+        n * (4_000 + 4_000 * u64::from(frames) + 24 * 4 * vertices) + dense
     }
 }
 

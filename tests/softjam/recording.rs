@@ -3,12 +3,14 @@
 use crate::common::Folder;
 use crate::files::{FORMATS, SmallDisk, open, record_all, record_as, recorder};
 use softjam::frame::Frame;
-use softjam::record::{self, Header, Writer};
+use softjam::record::{self, Header, Snapshot, Writer};
 use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::{Channels, Scene, Schedule};
 use std::io;
 use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 fn scene() -> Scene {
     Scene {
@@ -182,5 +184,42 @@ fn a_disk_that_fills_up_is_reported_at_once_wherever_it_happens() {
             failures += 1;
         }
         assert!(failures >= 7, "{failures} disks: the test tests nothing");
+    }
+}
+
+#[test]
+fn rare_metrics_reach_the_file_while_the_run_goes_on() {
+    let folder = Folder::new();
+    for name in ["a.rrd", "a.mcap"] {
+        let path = folder.path().join(name);
+        let scene = scene();
+        let run = Relaxation::new(&scene).expect("a valid scene");
+        let mut writer = Writer::create(&path, false, Header::of(&scene, &run)).expect("a file");
+        let mut send = |step| {
+            let snapshot = Snapshot {
+                step,
+                nanoseconds: 0,
+                metrics: Some(run.observables().metrics()),
+                frame: None,
+                contours: false,
+                contacts: false,
+                state: false,
+            };
+            writer.send(snapshot).expect("room");
+        };
+        // More than a batch spans, in fewer snapshots than are handed over together.
+        (0..12).for_each(|k| send(1000 * k));
+        let before = Instant::now();
+        let arrived = || {
+            Recording::open(&path)
+                .is_ok_and(|mut file| file.any(|event| matches!(event, Ok(Event::Metric { .. }))))
+        };
+        while !arrived() {
+            assert!(
+                before.elapsed().as_secs() < 60,
+                "{name}: no metrics after a minute"
+            );
+            sleep(Duration::from_millis(20));
+        }
     }
 }

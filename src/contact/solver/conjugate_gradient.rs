@@ -64,7 +64,7 @@ impl ConjugateGradient {
     }
 
     /// [`solve`](Self::solve) to a tolerance far above round-off: the residual tested last is the recurrence's own with
-    /// a bound of its round-off. Saves a product with the matrix.
+    /// an estimate of its round-off. Saves a product with the matrix.
     pub(crate) fn solve_loosely(
         &mut self,
         matrix: &ContactMatrix,

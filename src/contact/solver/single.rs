@@ -21,8 +21,8 @@ const DEEPEST: f64 = 1e-4;
 /// Iterations that are tried in a round; a dozen are enough.
 const ITERATIONS: usize = 60;
 
-/// The rounding of a residual, in units of the largest entry of `u`: a unit in the last place of single precision for each
-/// contact that a row has.
+/// An estimate of the rounding of a residual, in units of the largest entry of `u`: sixteen units in the last place of single
+/// precision, about one for each entry of a row. Where it matters the residual is computed anew in double precision.
 const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64);
 
 const STRETCH: usize = 1024;
@@ -56,7 +56,7 @@ impl Single {
     }
 
     /// Corrects `forces`, which leave `residual` (length), so that it falls to `goal`, or as far as a round goes. Returns
-    /// the iterations and a bound of the residual then; `None`, and nothing done, where single precision is not enough.
+    /// the iterations and an estimate of the residual then; `None`, and nothing done, where single precision is not enough.
     pub(super) fn correct(
         &mut self,
         matrix: &ContactMatrix,
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn where_single_precision_is_not_enough_double_is_taken() {
+    fn neighbours_in_nearly_one_direction_are_solved_to_the_tolerance() {
         // Two neighbours ever closer to one direction: beyond 1e-7 their rows are the same in single precision.
         for angle in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
             let at = |r: f64, t: f64| {

@@ -358,5 +358,6 @@ fn a_threshold_out_of_reach_ends_at_the_step_limit() {
     assert_eq!(run.step(), 3000);
     // The last frame is one of many at the level of round-off, whose f_max goes up and down by a factor of ten.
     assert!(count.lowest < 5e-13, "{count:?}");
+    assert!(run.f_max() < 5e-12, "{:e}", run.f_max());
     assert!((1..=20).contains(&count.given_up), "{count:?}");
 }
