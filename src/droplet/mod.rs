@@ -7,4 +7,5 @@
 mod angle;
 pub mod contour;
 pub mod kernel;
+mod outline;
 pub mod validity;

@@ -138,7 +138,7 @@ impl StripRows {
 }
 
 /// An opaque colour as rerun has it.
-fn rgba([r, g, b]: Rgb) -> u32 {
+pub(super) fn rgba([r, g, b]: Rgb) -> u32 {
     u32::from_be_bytes([r, g, b, 255])
 }
 

@@ -5,8 +5,8 @@
 //! has its numbers in one line of text, beside its place and its colour; in full they follow from the state.
 
 use super::cells::{Cells, Texts, own};
-use super::columns::Column;
-use super::pictures::Particles;
+use super::columns::{Column, rgba};
+use super::pictures::{Particles, dimmed};
 use crate::contact::Contacts;
 use crate::domain::Vec2;
 use rerun::{Ellipses2D, Points2D};
@@ -44,8 +44,8 @@ impl ParticleRows {
         p: usize,
     ) {
         self.centres.push([centre.x as f32, centre.y as f32]);
-        let [r, g, b] = particles.color(p).map(middle);
-        self.colors.push([u32::from_be_bytes([r, g, b, 255])]);
+        self.colors
+            .push([rgba(dimmed(particles.color(p), BRIGHTNESS))]);
         let numbers = &mut self.numbers;
         numbers.push("p ");
         numbers.push_number(particles.pressure[p] / line_tension);
@@ -77,10 +77,6 @@ impl ParticleRows {
         let disks = vec![disks.into_column(Ellipses2D::descriptor_centers())?];
         Ok((particles, disks))
     }
-}
-
-fn middle(part: u8) -> u8 {
-    (BRIGHTNESS * f64::from(part) + 0.5) as u8
 }
 
 /// Rows of the numbers of contacts in the making, in the order of the contacts.

@@ -6,7 +6,7 @@
 
 use super::cells::{Cells, own};
 use super::columns::{Column, StripRows};
-use super::pictures::Rgb;
+use super::pictures::{Rgb, dimmed};
 use crate::domain::{Domain, Vec2};
 use std::io;
 
@@ -69,11 +69,6 @@ fn around(l: Vec2, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2)) {
 /// How bright an image is beside what it is the image of.
 const BRIGHTNESS: f64 = 0.65;
 
-/// The colour of the image of something that has the colour `rgb`.
-pub(super) fn dim(rgb: Rgb) -> Rgb {
-    rgb.map(|part| (BRIGHTNESS * f64::from(part) + 0.5) as u8)
-}
-
 /// Rows of images in the making.
 #[derive(Default)]
 pub(super) struct ImageRows {
@@ -99,7 +94,8 @@ impl ImageRows {
                 (f64::from(y) + shift.y) as f32,
             ]
         };
-        self.strips.strip(points.iter().map(moved), dim(rgb));
+        self.strips
+            .strip(points.iter().map(moved), dimmed(rgb, BRIGHTNESS));
         self.of.push([of as u32]);
     }
 

@@ -9,6 +9,11 @@ use std::sync::LazyLock;
 /// Red, green, blue.
 pub(super) type Rgb = [u8; 3];
 
+/// A colour made darker by the factor `brightness`.
+pub(super) fn dimmed(rgb: Rgb, brightness: f64) -> Rgb {
+    rgb.map(|part| (brightness * f64::from(part) + 0.5) as u8)
+}
+
 /// What is seen of each particle beside its contour.
 pub(super) struct Particles {
     /// The pressure `p_i = Σ_j f_ij / 2πR_i` on it (force/length).

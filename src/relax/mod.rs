@@ -22,14 +22,15 @@
 pub mod fire;
 pub mod frequency;
 pub mod newton;
+mod present;
 mod status;
 
 pub use status::{RelaxError, Status};
 
-use crate::contact::{ACCEPTED, ContactError, ContactLaw, Contacts};
+use crate::contact::{ACCEPTED, ContactError, ContactLaw};
 use crate::disks::{self, DiskReport};
 use crate::domain::Vec2;
-use crate::force::{Backbone, NetForces, Observables, largest_force};
+use crate::force::{NetForces, largest_force};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::scene::{Minimizer, Scene, start};
@@ -346,155 +347,6 @@ impl Relaxation {
         } else {
             Status::Running
         }
-    }
-
-    /// This frame, as a value of its own.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.frame().positions, run.packing().positions());
-    /// ```
-    #[must_use]
-    pub fn frame(&self) -> Frame {
-        let contacts = self.law.contacts();
-        Frame {
-            step: self.step,
-            positions: self.packing.positions().to_vec(),
-            velocities: self.velocities.clone(),
-            contacts: contacts.pairs.to_vec(),
-            forces: contacts.forces.to_vec(),
-            minimizer: self.state,
-        }
-    }
-
-    /// The packing as it stands.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.packing().len(), 32);
-    /// ```
-    #[must_use]
-    pub fn packing(&self) -> &Packing {
-        &self.packing
-    }
-
-    /// The contacts and forces at this frame.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.contacts().forces.iter().all(|f| *f > 0.0));
-    /// ```
-    #[must_use]
-    pub fn contacts(&self) -> Contacts<'_> {
-        self.law.contacts()
-    }
-
-    /// The net forces `F_i`, one a particle (force; `line_tension` is in the same unit).
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// let total: softjam::domain::Vec2 = run.net_forces().iter().sum();
-    /// assert!(total.norm() < 1e-14);
-    /// ```
-    #[must_use]
-    pub fn net_forces(&self) -> &[Vec2] {
-        &self.net
-    }
-
-    /// Number of moves made.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.step(), 0);
-    /// ```
-    #[must_use]
-    pub fn step(&self) -> u64 {
-        self.step
-    }
-
-    /// Simulated time, the sum of the time steps.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.time(), 0.0);
-    /// ```
-    #[must_use]
-    pub fn time(&self) -> f64 {
-        self.state.time
-    }
-
-    /// The largest net force `f_max` (units of γ).
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.f_max(), run.observables().f_max);
-    /// ```
-    #[must_use]
-    pub fn f_max(&self) -> f64 {
-        self.f_max
-    }
-
-    /// Balance, energy, stress and coordination at this frame.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.observables().energy > 0.0);
-    /// ```
-    #[must_use]
-    pub fn observables(&self) -> Observables {
-        self.observables_counted(&mut Backbone::default())
-    }
-
-    /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
-    ///
-    /// See the example of [`Backbone`].
-    pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
-        Observables::counted(
-            &self.law.contacts(),
-            self.packing.domain(),
-            self.packing.len(),
-            self.law.line_tension(),
-            (self.f_max, self.state.dt),
-            backbone,
-        )
-        .with_torques(
-            &self.law.contacts(),
-            self.packing.domain(),
-            self.law.line_tension(),
-            self.form.torques(),
-        )
-    }
-
-    /// The contact law with its residual and its count of work.
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.law().residual() <= run.law().accepted_residual());
-    /// ```
-    #[must_use]
-    pub fn law(&self) -> &ContactLaw {
-        &self.law
-    }
-
-    /// How the undeformed disks relaxed; `None` where there was no such stage (a start from a file, a resumed run).
-    ///
-    /// ```
-    /// # use softjam::{relax::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.disks().unwrap().converged);
-    /// ```
-    #[must_use]
-    pub fn disks(&self) -> Option<DiskReport> {
-        self.disks
     }
 }
 
