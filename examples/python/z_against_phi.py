@@ -43,6 +43,9 @@ for phi, runs in sorted(samples.items()):
     points.append((phi, statistics.fmean(z), error))
 
 if arguments.output:
+    if not points:
+        sys.exit("nothing to draw")
+
     import matplotlib
 
     matplotlib.use("Agg")

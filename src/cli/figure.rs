@@ -1,7 +1,7 @@
 //! `softjam figure`: pictures for papers and talks.
 
 use super::{Verdict, print};
-use softjam::figure::{self, ColorBy, Fall, FigureError, Shape, Style};
+use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
@@ -96,11 +96,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 /// What tells runs apart: coverage, number of particles, seed or start file.
 type Names = [String; 3];
 
-/// Names beyond this number cannot be told apart by their colours.
-const COLORS: usize = 6;
-
 /// Each curve is called by its coverage and by what else is not the same in all of them; samples of one coverage share
-/// a name, and with it a colour, where there would be too many.
+/// a name, and with it a colour, where names could not be told apart by their colours.
 fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
     let all: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
@@ -110,7 +107,7 @@ fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     };
     let distinct: BTreeSet<String> = runs.iter().map(|(names, _)| label(names, &all)).collect();
     let without_seed: Vec<usize> = all.iter().copied().filter(|k| *k != 2).collect();
-    let shown = if distinct.len() > COLORS {
+    let shown = if distinct.len() > CURVE_COLORS {
         without_seed
     } else {
         all

@@ -81,9 +81,7 @@ impl Findings {
         }
         found
     }
-}
 
-impl Findings {
     /// How far the last state strains the linear model; nothing if it is no state of this packing.
     fn squeeze(&self, recording: &Recording) -> Option<Validity> {
         let last = self.last.as_ref()?;

@@ -77,6 +77,23 @@ const COLORS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
 ];
 
+/// How many curves of a [`chart`] have a colour of their own; from there on colours come again.
+///
+/// ```
+/// use softjam::figure::{Axis, CURVE_COLORS, Curve, chart};
+///
+/// let curve = |k: usize| Curve { label: format!("curve {k}"), points: vec![(0.0, 0.0), (1.0, k as f64)], ..Curve::default() };
+/// let curves: Vec<Curve> = (0..=CURVE_COLORS).map(curve).collect();
+/// let colors = |n: usize| {
+///     let svg = chart(&Axis::default(), &Axis::default(), &curves[..n]).unwrap();
+///     let lines = svg.split("<polyline").skip(1).filter_map(|line| line.split("stroke=\"").nth(1)?.split('"').next());
+///     lines.map(str::to_owned).collect::<std::collections::BTreeSet<_>>().len()
+/// };
+/// assert_eq!(colors(CURVE_COLORS), colors(CURVE_COLORS - 1) + 1);
+/// assert_eq!(colors(CURVE_COLORS + 1), colors(CURVE_COLORS));
+/// ```
+pub const CURVE_COLORS: usize = COLORS.len();
+
 /// The colour of what is dashed.
 const GREY: RGBColor = RGBColor(60, 60, 60);
 
@@ -92,7 +109,8 @@ const POINTS: usize = 4000;
 ///
 /// # Errors
 ///
-/// [`FigureError::Nothing`] if there is no point to draw.
+/// [`FigureError::Nothing`] if there is no point to draw, [`FigureError::Draw`] if points lie farther from each other than
+/// the largest number.
 ///
 /// ```
 /// use softjam::figure::{Axis, Curve, Mark, Scale, chart};
@@ -120,9 +138,8 @@ pub fn chart(x: &Axis, y: &Axis, curves: &[Curve]) -> Result<String, FigureError
             .flat_map(|c| (0..c.points.len()).flat_map(|k| reach(c, k)))
     };
     let shown = |&(a, b): &(f64, f64)| x.scale.place(a).is_some() && y.scale.place(b).is_some();
-    let nothing = || FigureError::Nothing("there is no point to draw".to_owned());
-    let across = Ruler::over(x.scale, points().filter(shown).map(|p| p.0)).ok_or_else(nothing)?;
-    let up = Ruler::over(y.scale, points().filter(shown).map(|p| p.1)).ok_or_else(nothing)?;
+    let across = Ruler::over(x.scale, points().filter(shown).map(|p| p.0))?;
+    let up = Ruler::over(y.scale, points().filter(shown).map(|p| p.1))?;
     let mut svg = String::new();
     let area =
         SVGBackend::with_string(&mut svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
@@ -154,46 +171,54 @@ struct Ruler {
 }
 
 impl Ruler {
-    fn over(scale: Scale, values: impl Iterator<Item = f64>) -> Option<Self> {
+    fn over(scale: Scale, values: impl Iterator<Item = f64>) -> Result<Self, FigureError> {
         let places = values.filter_map(|v| scale.place(v));
         let (least, most) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
             (a.min(v), b.max(v))
         });
         if least > most {
-            return None;
+            let problem = "there is no point to draw".to_owned();
+            return Err(FigureError::Nothing(problem));
         }
-        Some(match scale {
-            Scale::Linear => {
-                let width = if most > least {
-                    most - least
-                } else {
-                    most.abs().max(1.0)
-                };
-                // An axis that starts at zero starts there.
-                let from = if least == 0.0 {
-                    0.0
-                } else {
-                    least - 0.04 * width
-                };
-                let rough = width / 6.0;
-                let decade = libm::exp10(libm::floor(libm::log10(rough)));
-                let fits = |m: &f64| m * decade >= 0.999 * rough;
-                let step = [1.0, 2.0, 5.0]
-                    .into_iter()
-                    .find(fits)
-                    .map_or(10.0 * decade, |m| m * decade);
-                let ends = from..most + 0.04 * width;
-                Self { scale, ends, step }
-            }
+        let (ends, step) = match scale {
+            Scale::Linear => linear(least, most)?,
             Scale::Logarithmic => {
                 let from = libm::floor(least);
                 let to = libm::ceil(most).max(from + 1.0);
-                let step = libm::ceil((to - from) / 14.0);
-                let ends = from..to;
-                Self { scale, ends, step }
+                (from..to, libm::ceil((to - from) / 14.0))
             }
-        })
+        };
+        Ok(Self { scale, ends, step })
     }
+}
+
+/// Ends and step of an axis of evenly spaced numbers.
+fn linear(least: f64, most: f64) -> Result<(Range<f64>, f64), FigureError> {
+    let step_of = |width: f64| {
+        let rough = width / 6.0;
+        let decade = libm::exp10(libm::floor(libm::log10(rough)));
+        let fits = |m: &f64| m * decade >= 0.999 * rough;
+        let step = [1.0, 2.0, 5.0].into_iter().find(fits);
+        step.map_or(10.0 * decade, |m| m * decade)
+    };
+    let (mut width, mut step) = (most - least, step_of(most - least));
+    if !(step > 0.0 && step.is_finite()) {
+        // One number, or numbers as good as one.
+        width = most.abs().max(1.0);
+        step = step_of(width);
+    }
+    // An axis that starts at zero starts there.
+    let from = if least == 0.0 {
+        0.0
+    } else {
+        least - 0.04 * width
+    };
+    let to = most + 0.04 * width;
+    if !(to - from).is_finite() {
+        let problem = format!("{least:e} and {most:e} do not go on one axis");
+        return Err(FigureError::Draw(problem));
+    }
+    Ok((from..to, step))
 }
 
 impl Ranged for Ruler {
@@ -366,4 +391,38 @@ fn one(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(ys: &[f64]) -> Result<String, FigureError> {
+        let points = ys.iter().enumerate().map(|(k, y)| (k as f64, *y)).collect();
+        let curve = Curve {
+            points,
+            ..Curve::default()
+        };
+        chart(&Axis::default(), &Axis::default(), &[curve])
+    }
+
+    #[test]
+    fn numbers_too_near_each_other_for_a_step_are_drawn_as_one() {
+        let tiny = f64::from_bits(1);
+        for ys in [[-tiny, tiny], [0.0, tiny], [-3.0 * tiny, 2.0 * tiny]] {
+            let svg = drawn(&ys).unwrap();
+            assert!(!svg.contains("NaN") && svg.len() < 20_000, "{ys:?}: {svg}");
+            assert!(svg.contains("\n0.0\n"), "{ys:?}: {svg}");
+        }
+    }
+
+    #[test]
+    fn numbers_too_far_from_each_other_for_an_axis_are_refused() {
+        for ys in [[-1e308, 1e308], [0.0, f64::MAX], [f64::MAX, f64::MAX]] {
+            let error = drawn(&ys).unwrap_err().to_string();
+            assert!(error.contains("do not go on one axis"), "{ys:?}: {error}");
+        }
+        let svg = drawn(&[-8e307, 8e307]).unwrap();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
 }

@@ -19,7 +19,7 @@ mod chart;
 mod packing;
 mod relaxation;
 
-pub use chart::{Axis, Curve, Mark, Scale, chart};
+pub use chart::{Axis, CURVE_COLORS, Curve, Mark, Scale, chart};
 pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation};
 

@@ -18,7 +18,7 @@ pub struct Fall {
     pub label: String,
     /// Steps with their `f_max` (units of γ).
     pub points: Vec<(u64, f64)>,
-    /// Where the run ends (units of γ), drawn as a dashed line.
+    /// Where the run ends (units of γ), drawn as a dashed line; left out below 10⁻¹⁸, where no `f_max` is drawn either.
     pub threshold: Option<f64>,
 }
 
@@ -46,7 +46,8 @@ pub fn relaxation(runs: &[Fall]) -> Result<String, FigureError> {
         ..Curve::default()
     };
     let mut curves: Vec<Curve> = runs.iter().map(curve).collect();
-    let mut thresholds: Vec<f64> = runs.iter().filter_map(|run| run.threshold).collect();
+    let thresholds = runs.iter().filter_map(|run| run.threshold);
+    let mut thresholds: Vec<f64> = thresholds.filter(|f| *f >= LEAST).collect();
     thresholds.sort_by(f64::total_cmp);
     thresholds.dedup();
     curves.extend(thresholds.into_iter().map(|f| Curve {
@@ -64,4 +65,28 @@ pub fn relaxation(runs: &[Fall]) -> Result<String, FigureError> {
         &axis("f_max / γ", Scale::Logarithmic),
         &curves,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threshold_below_every_f_max_that_is_drawn_is_left_out() {
+        let drawn = |threshold| {
+            let points = vec![(0, 1e-2), (1, 1e-9)];
+            let label = "run".to_owned();
+            relaxation(&[Fall {
+                label,
+                points,
+                threshold,
+            }])
+            .unwrap()
+        };
+        let without = drawn(None);
+        for threshold in [1e-300, 0.0, -1.0, f64::NAN, 0.999 * LEAST] {
+            assert_eq!(drawn(Some(threshold)), without, "{threshold}");
+        }
+        assert!(drawn(Some(LEAST)).contains("threshold"));
+    }
 }

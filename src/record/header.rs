@@ -3,7 +3,7 @@
 use super::columns::array;
 use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, PROGRAM, legend};
-use crate::scene::Start;
+use crate::scene::{Scene, Start};
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
@@ -29,10 +29,10 @@ pub(super) fn write<W: Write>(
     let l = packing.domain().lengths();
     // What the viewer lists the recording as.
     let name = format!(
-        "N = {}, φ = {:.3}, seed {}",
+        "N = {}, φ = {:.3}, {}",
         packing.len(),
         packing.coverage(),
-        header.scene.seed
+        start(&header.scene, "seed")
     );
     put("/__properties", &RecordingInfo::new().with_name(name))?;
     put("/scene", &TextDocument::from_markdown(text(header)))?;
@@ -97,15 +97,20 @@ fn scene(header: &Header) -> DynamicArchetype {
         )
 }
 
+/// What a scene starts from, in words; those before the number of a random start are `seed`.
+fn start(scene: &Scene, seed: &str) -> String {
+    match &scene.start {
+        Start::Random => format!("{seed} {}", scene.seed),
+        Start::Hexagonal => "a hexagonal crystal".to_owned(),
+        Start::File { path, .. } => format!("the packing in `{path}`"),
+    }
+}
+
 /// What a person who opens the recording reads beside the pictures.
 fn text(header: &Header) -> String {
     let (scene, packing) = (&header.scene, &header.packing);
     let l = packing.domain().lengths();
-    let start = match &scene.start {
-        Start::Random => format!("a random start, seed {}", scene.seed),
-        Start::Hexagonal => "a hexagonal crystal".to_owned(),
-        Start::File { path, .. } => format!("the packing in `{path}`"),
-    };
+    let start = start(scene, "a random start, seed");
     let first = match header.from_step {
         0 => String::new(),
         step => format!(" The recording begins with step {step}."),

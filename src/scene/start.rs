@@ -33,7 +33,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// assert!((packing.coverage() - 0.84).abs() < 1e-12);
 /// ```
 pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
-    let packing = match &scene.start {
+    let (packing, aspect) = match &scene.start {
         Start::File { path, blake3 } => return start_file::of_scene(path, blake3.as_deref()),
         Start::Random => {
             let mut random = Random::new(scene.seed);
@@ -51,11 +51,8 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
             // A stable sort: the same numbers everywhere, whatever lies in one square.
             particles.sort_by_key(|(place, ..)| *place);
             let radii = particles.iter().map(|(_, _, radius)| *radius).collect();
-            make(
-                domain,
-                radii,
-                particles.iter().map(|(_, p, _)| *p).collect(),
-            )?
+            let positions = particles.iter().map(|(_, p, _)| *p).collect();
+            (make(domain, radii, positions)?, scene.aspect)
         }
         Start::Hexagonal => {
             let mut random = Random::new(scene.seed);
@@ -75,14 +72,10 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
                     Vec2::new((column as f64 + shift) * dx, (row as f64 + 0.5) * dy)
                 })
                 .collect();
-            make(domain, radii, positions)?
+            (make(domain, radii, positions)?, l.x / l.y)
         }
     };
     let (l, largest_radius) = (packing.domain().lengths(), packing.largest_radius());
-    let aspect = match scene.start {
-        Start::Hexagonal => l.x / l.y,
-        Start::Random | Start::File { .. } => scene.aspect,
-    };
     if is_small(&packing) {
         return Err(SceneError::BoxTooSmall {
             particles: packing.len(),

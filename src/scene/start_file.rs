@@ -83,46 +83,57 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
     }
     let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let domain = csv_box(text).map_err(|(line, problem)| wrong(line, problem))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let quoted =
-        |(line, row): (u64, &str), problem: &str| wrong(line, format!("`{row}` {problem}"));
-    let header = reader.headers().map_err(|e| wrong(0, e.to_string()))?;
+    parse(text).map_err(|(line, problem)| wrong(line, problem))
+}
+
+/// The packing that is written in `text`, or the line that is wrong (0 for the whole) and what is wrong with it.
+fn parse(text: &str) -> Result<Packing, (u64, String)> {
+    let domain = csv_box(text)?;
+    let mut reader = reader(text);
+    let header = reader.headers().map_err(|e| (0, e.to_string()))?;
     if header != ["x", "y", "radius"].as_slice() {
-        return Err(match row(text, 0) {
-            (0, _) => wrong(0, "there is no header `x,y,radius`".into()),
-            other => quoted(other, "is not the header `x,y,radius`"),
+        return Err(match row(text, header.position()) {
+            (_, "") => (0, "there is no header `x,y,radius`".into()),
+            (line, row) => (
+                line,
+                format!("{} is not the header `x,y,radius`", quote(row)),
+            ),
         });
     }
     let (mut positions, mut radii) = (Vec::new(), Vec::new());
     for record in reader.deserialize::<(f64, f64, f64)>() {
-        let Ok((x, y, radius)) = record else {
-            let row = row(text, radii.len() + 1);
-            return Err(quoted(row, "is not three numbers x,y,radius"));
-        };
+        let (x, y, radius) = record.map_err(|error| match row(text, error.position()) {
+            (line, "") => (line, "there are not three numbers x,y,radius".into()),
+            (line, row) => (
+                line,
+                format!("{} is not three numbers x,y,radius", quote(row)),
+            ),
+        })?;
         positions.push(Vec2::new(x, y));
         radii.push(radius);
     }
     let packing = Packing::new(domain, radii, positions).map_err(|error| {
         let line = match error {
             PackingError::Radius { particle, .. } | PackingError::Position { particle, .. } => {
-                row(text, particle + 1).0
+                line_of(text, particle)
             }
             _ => 0,
         };
-        wrong(line, error.to_string())
+        (line, error.to_string())
     })?;
     let phi = packing.coverage();
     if !(phi > 0.0 && phi < 1.3) {
-        return Err(wrong(
-            0,
-            format!("its phi = {phi} is outside 0 < phi < 1.3 (coverage of the undeformed disks)"),
-        ));
+        let problem = "is outside 0 < phi < 1.3 (coverage of the undeformed disks)";
+        return Err((0, format!("its phi = {phi} {problem}")));
     }
     Ok(packing)
+}
+
+fn reader(text: &str) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes())
 }
 
 /// A start file of the largest packing is about half as long.
@@ -140,12 +151,43 @@ pub(super) fn read_file(path: &str) -> Result<Vec<u8>, SceneError> {
     Ok(bytes)
 }
 
-/// The `k`-th line that is neither blank nor a comment, with its number: 0 is the header, `k` particle `k − 1`.
-fn row(text: &str, k: usize) -> (u64, &str) {
-    let rows = (1..).zip(text.lines());
-    let mut rows = rows.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    rows.nth(k).unwrap_or((0, ""))
+/// The first line of the row that the reader began to look for at `position`, without the blanks around it, and the
+/// number of that line: as the reader does, it passes over line ends and comments.
+fn row<'a>(text: &'a str, position: Option<&csv::Position>) -> (u64, &'a str) {
+    let begin = position.and_then(|p| text.get(p.byte() as usize..));
+    let Some(mut rest) = begin else {
+        return (0, "");
+    };
+    loop {
+        rest = rest.trim_start_matches(['\r', '\n']);
+        if !rest.starts_with('#') {
+            break;
+        }
+        rest = rest.split_once('\n').map_or("", |(_, after)| after);
+    }
+    let before = &text[..text.len() - rest.len()];
+    let line = 1 + before.matches('\n').count() as u64;
+    let end = rest.find(['\r', '\n']).unwrap_or(rest.len());
+    (line, rest[..end].trim())
 }
+
+/// The line on which a particle stands.
+fn line_of(text: &str, particle: usize) -> u64 {
+    let record = reader(text).into_records().nth(particle);
+    let record = record.and_then(Result::ok);
+    row(text, record.as_ref().and_then(|r| r.position())).0
+}
+
+/// The beginning of a line, fit for a terminal.
+fn quote(line: &str) -> String {
+    match line.char_indices().nth(QUOTED) {
+        Some((end, _)) => format!("`{}…`", line[..end].escape_debug()),
+        None => format!("`{}`", line.escape_debug()),
+    }
+}
+
+/// Characters of a line that a message quotes at most.
+const QUOTED: usize = 60;
 
 /// The sides of the box from the comment `# box = L_x, L_y`.
 fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
@@ -165,7 +207,7 @@ fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
             _ => None,
         }
         .ok_or_else(|| {
-            let problem = format!("`{}` does not give two positive sides", line.trim());
+            let problem = format!("{} does not give two positive sides", quote(line.trim()));
             (number, problem)
         });
     }
@@ -173,4 +215,80 @@ fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
         0,
         "no comment `# box = L_x, L_y` gives the periodic box".into(),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn complaint(rows: &str) -> (u64, String) {
+        parse(&format!("# box = 6, 6\nx,y,radius\n{rows}")).unwrap_err()
+    }
+
+    #[test]
+    fn line_is_that_of_the_row_that_the_reader_refuses() {
+        for (rows, line, shown) in [
+            ("1,1,0.5\n2,one,0.5\n", 4, "`2,one,0.5` is not"),
+            // A lone return ends a row, but no line.
+            ("1,1,0.5\r2,one,0.5\r", 3, "`2,one,0.5` is not"),
+            (
+                "1,1,0.5\r\n\r\n# two\r\n2,one,0.5\r\n",
+                6,
+                "`2,one,0.5` is not",
+            ),
+            ("\"1\n\",1,0.5\n2,one,0.5\n", 5, "`2,one,0.5` is not"),
+            ("\"1\n\",1,0.5\n2,1,-0.5\n", 5, "radius -0.5 of particle 1"),
+            (
+                "1,1,0.5\n# two\n\n2,nan,0.5\n",
+                6,
+                "position (2, NaN) of particle 1",
+            ),
+            ("1,1,0.5\n   \n", 4, "there are not three numbers"),
+            // Only what begins its line is a comment.
+            ("1,1,0.5\n # two\n", 4, "`# two` is not"),
+            ("1,1,0.5\n# two\n2,é", 5, "`2,é` is not"),
+        ] {
+            let (at, problem) = complaint(rows);
+            assert!(
+                at == line && problem.starts_with(shown),
+                "{rows:?}: {at}: {problem}"
+            );
+        }
+        for (text, line, shown) in [
+            (
+                "\n# box = 6, 6\n\n\nx,y\n1,1\n",
+                5,
+                "`x,y` is not the header",
+            ),
+            ("# box = 6, 6\n\n", 0, "there is no header"),
+        ] {
+            let (at, problem) = parse(text).unwrap_err();
+            assert!(
+                at == line && problem.starts_with(shown),
+                "{text:?}: {at}: {problem}"
+            );
+        }
+    }
+
+    #[test]
+    fn quotes_are_short_and_without_control_characters() {
+        let long = "7".repeat(5_000_000);
+        let escape = "\u{1b}]0;title\u{7}\u{202e}";
+        for text in [long.as_str(), escape, &"é\u{1b}".repeat(1000)] {
+            for file in [
+                format!("# box = 6, 6\n{text}\n1,1,0.5\n"),
+                format!("# box = 6, 6\nx,y,radius\n{text}\n"),
+                format!("# box = 6, 6\nx,y,radius\n1,1,{text}x\n"),
+                format!("# box = {text}, wide\nx,y,radius\n1,1,0.5\n"),
+            ] {
+                let (line, problem) = parse(&file).unwrap_err();
+                assert!((1..=3).contains(&line), "{line}: {problem}");
+                assert!(problem.len() < 600 && problem.contains('`'), "{problem}");
+                let plain = |c: char| c == '…' || c == 'é' || c == ' ' || c.is_ascii_graphic();
+                assert!(problem.chars().all(plain), "{problem:?}");
+            }
+        }
+        assert_eq!(quote(&"7".repeat(60)), format!("`{}`", "7".repeat(60)));
+        assert_eq!(quote(&"7".repeat(61)), format!("`{}…`", "7".repeat(60)));
+    }
 }

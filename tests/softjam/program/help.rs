@@ -113,39 +113,53 @@ fn messages_name_the_thing_its_value_and_the_way_out() {
     );
     at("a.csv", "# box = 6, 6\nx,y,radius\n1,1,0.5\n2,1,0.5\n");
     super::record(folder.path(), "metrics.rrd", &["--channels", "metrics"]);
-    let told: [(&[&str], &[&str]); 10] = [
-        (&["record", "--phi", "abc"], &["'abc'", "--phi", "a number"]),
-        (&["record", "-N", "2.5"], &["'2.5'", "whole number"]),
+    let told: [(i32, &[&str], &[&str]); 10] = [
         (
+            2,
+            &["record", "--phi", "abc"],
+            &["'abc'", "--phi", "a number"],
+        ),
+        (2, &["record", "-N", "2.5"], &["'2.5'", "whole number"]),
+        (
+            2,
             &["record", "--start", "file"],
             &["start = \"file\"", "--file"],
         ),
         (
+            2,
             &["record", "--forces", "none"],
             &["`none`", "`central` or `gradient`"],
         ),
         (
+            2,
             &["record", "disks.toml"],
             &["disks", "as it stands", "leave [disks] out"],
         ),
-        (&["record", "-o", "no/x.rrd"], &["no/x.rrd", "no folder no"]),
         (
+            1,
+            &["record", "-o", "no/x.rrd"],
+            &["no/x.rrd", "no folder no"],
+        ),
+        (
+            2,
             &["record", "--from", "metrics.rrd"],
             &["metrics.rrd", "--channels state"],
         ),
         (
+            2,
             &["convert", "metrics.rrd", "metrics.rrd"],
             &["metrics.rrd", "another file"],
         ),
         (
+            2,
             &["figure", "metrics.rrd", "-o", "x.svg"],
             &["metrics.rrd", "--channels state"],
         ),
-        (&["replay", "a.csv"], &["a.csv", "not a recording"]),
+        (1, &["replay", "a.csv"], &["a.csv", "not a recording"]),
     ];
-    for (arguments, words) in told {
+    for (expected, arguments, words) in told {
         let (code, _, errors) = run(folder.path(), arguments);
-        assert!(matches!(code, Some(1 | 2)), "{arguments:?}: {code:?}");
+        assert_eq!(code, Some(expected), "{arguments:?}: {errors}");
         for word in words {
             assert!(
                 errors.contains(word),
