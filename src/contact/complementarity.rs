@@ -21,18 +21,21 @@
 //! See the example of [`ContactLaw`], through which this is used.
 
 use super::error::ContactError;
-use super::geometry::{Kept, arrivals, rearrange};
 use super::images::second_image;
 use super::law::ContactLaw;
-use super::solver::LinearSolver;
+use super::present::in_order;
+use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::packing::Packing;
-use crate::wide::{largest_magnitude, wide};
+use crate::wide::wide;
 use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
+
+/// How much wider than its sum a bound of a bulge is taken, for the rounding of the sum.
+pub(super) const WIDER: f64 = 1.0 + 1e-12;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
 const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
@@ -70,7 +73,7 @@ impl ContactLaw {
             if mends > 0 && self.is_mendable() {
                 mends -= 1;
                 if self.mend(packing) {
-                    self.assemble(packing);
+                    self.measure_scale();
                     let (scale, worst) = (self.scale(), self.off.max(self.tolerated));
                     self.residual = if scale > 0.0 { worst / scale } else { worst };
                     return Ok(());
@@ -80,17 +83,17 @@ impl ContactLaw {
             if count < best {
                 best = count;
                 patience = PATIENCE;
-                self.exchange(count);
+                self.exchange(packing, count);
             } else if patience > 0 {
                 patience -= 1;
-                self.exchange(count);
+                self.exchange(packing, count);
             } else {
-                self.exchange(1);
+                self.exchange(packing, 1);
             }
         }
         Err(ContactError::Unsettled {
             offending: self.offending.len(),
-            contacts: self.pairs.len(),
+            contacts: self.contact_count(),
             sweeps: most,
         })
     }
@@ -100,23 +103,14 @@ impl ContactLaw {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
-            && 64 * self.offending.len() <= self.pairs.len()
+            && 64 * self.offending.len() <= self.contact_count()
     }
 
     /// Forces of the present set, and the pairs that offend, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         self.assemble(packing);
-        let scale = self.scale();
-        let tolerance = self.allowed(scale);
-        let overlaps = self.geometry.overlaps();
-        let iterations = if tolerance > FAR_ABOVE_ROUND_OFF * scale {
-            self.solver
-                .solve_loosely(&self.matrix, overlaps, &mut self.forces, tolerance)
-        } else {
-            self.solver
-                .solve(&self.matrix, overlaps, &mut self.forces, tolerance)
-        }?;
+        let iterations = self.find_forces(packing)?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
             Some(largest) => self.off = largest,
@@ -126,36 +120,73 @@ impl ContactLaw {
         Ok(())
     }
 
+    /// Solves `A f = δ` of the present set; returns the iterations.
+    fn find_forces(&mut self, packing: &Packing) -> Result<usize, SolverError> {
+        let scale = self.scale();
+        let tolerance = self.allowed(scale);
+        let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
+        let forces = &mut self.forces[..];
+        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
+            return self.solver.solve(matrix, overlaps, forces, tolerance);
+        };
+        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
+        let iterations = match solver.begin(matrix, overlaps, forces, tolerance, loosely)? {
+            Progress::Done(iterations) => return Ok(iterations),
+            Progress::NeedsWhole(iterations) => iterations,
+        };
+        self.put_in_order(&[]);
+        self.assemble(packing);
+        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
+            return Ok(iterations);
+        };
+        let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
+        solver.finish(matrix, overlaps, &mut self.forces, tolerance, iterations)
+    }
+
     /// Geometry and matrix of the present set at the present positions; what still stands is not done again.
     pub(super) fn assemble(&mut self, packing: &Packing) {
-        if self.structured && self.refreshed {
-            return;
+        if !self.refreshed && self.is_untidy() {
+            self.put_in_order(&[]);
         }
         if !self.structured {
             self.list.rebuild(packing.len(), &self.pairs);
             self.work.structures += 1;
-            if self.refreshed {
-                self.geometry.exchange(packing, &self.list, &self.kept);
-                let (of, tension) = (&self.geometry, self.line_tension);
-                self.matrix
-                    .exchange(packing, &self.list, of, &self.exchanged, tension);
-                self.structured = true;
-                self.measure_scale();
-                return;
-            }
             self.geometry.restructure(&self.list);
             let duplicate = self.geometry.duplicate();
             self.matrix
                 .restructure(packing, &self.list, duplicate, self.line_tension);
         }
-        if !self.refreshed {
-            self.geometry.refresh(packing, &self.list);
+        if !(self.structured && self.refreshed) {
+            self.geometry.refresh(packing, &self.pairs);
+            self.matrix
+                .refresh(packing, &self.geometry, self.line_tension);
             self.work.assemblies += 1;
+            (self.structured, self.refreshed) = (true, true);
         }
-        self.matrix
-            .refresh(packing, &self.geometry, self.line_tension);
-        (self.structured, self.refreshed) = (true, true);
         self.measure_scale();
+    }
+
+    /// Whether so many contacts have left or come since the structure was built that it is time for a new one.
+    fn is_untidy(&self) -> bool {
+        16 * self.at_rest.len() > self.pairs.len() + 256
+            || 64 * self.matrix.stragglers() > self.pairs.len() + 1024
+    }
+
+    /// Numbers the contacts in the order of pairs, without those that have left and with those that `came`; their structure
+    /// is to be built.
+    fn put_in_order(&mut self, came: &[([u32; 2], f64)]) {
+        if came.is_empty() && self.is_in_order() {
+            return;
+        }
+        let order = in_order(&self.pairs, &self.matrix);
+        let known = order.iter().map(|c| *c as usize);
+        let known = known.map(|c| (self.pairs[c], self.forces[c]));
+        let mut contacts: Vec<_> = known.chain(came.iter().copied()).collect();
+        contacts.sort_by_key(|c| c.0);
+        (self.pairs, self.forces) = contacts.into_iter().unzip();
+        self.at_rest.clear();
+        self.added.clear();
+        (self.structured, self.parted) = (false, false);
     }
 
     /// The largest `|δ|`, the scale of all residuals.
@@ -163,20 +194,37 @@ impl ContactLaw {
         self.scale
     }
 
-    fn measure_scale(&mut self) {
-        self.scale = wide(
+    pub(super) fn measure_scale(&mut self) {
+        let larger = |m: f64, x: f64| if x > m { x } else { m };
+        let in_contact = |d: f64, s: f64| if s > 0.0 { d.abs() } else { 0.0 };
+        let (d8, d_rest) = self.geometry.overlaps().as_chunks::<8>();
+        let (s8, s_rest) = self.matrix.scaling().as_chunks::<8>();
+        let mut largest = [0.0; 8];
+        wide(
             #[inline(always)]
-            || largest_magnitude(self.geometry.overlaps()),
+            || {
+                for (d, s) in d8.iter().zip(s8) {
+                    for k in 0..8 {
+                        largest[k] = larger(largest[k], in_contact(d[k], s[k]));
+                    }
+                }
+            },
         );
+        let rest = d_rest.iter().zip(s_rest).map(|(d, s)| in_contact(*d, *s));
+        self.scale = rest.chain(largest).fold(0.0, larger);
     }
 
     /// `max |A f − δ|` of the present forces.
     pub(super) fn measure_equation(&mut self) {
         self.image.resize(self.forces.len(), 0.0);
-        self.matrix.multiply(&self.forces, &mut self.image);
+        self.matrix
+            .multiply_with(&self.forces, &mut self.image, &mut self.halves);
         self.off = 0.0;
-        for (q, d) in self.image.iter().zip(self.geometry.overlaps()) {
-            self.off = self.off.max((d - q).abs());
+        let rows = self.image.iter().zip(self.geometry.overlaps());
+        for ((q, d), s) in rows.zip(self.matrix.scaling()) {
+            if *s > 0.0 {
+                self.off = self.off.max((d - q).abs());
+            }
         }
     }
 
@@ -190,20 +238,28 @@ impl ContactLaw {
     }
 
     /// `B_i`, and a neighbour list that covers the largest of them.
+    ///
+    /// The sums run by the numbers of the contacts, so their last bits depend on these; the bounds are wider than that, and a
+    /// pair between one and the other is far apart.
     fn bound_bulges(&mut self, packing: &Packing) {
         self.bulges.clear();
         self.bulges.resize(packing.len(), 0.0);
+        // The sum of a lower particle is carried from pair to pair: it would else go through memory and back each time.
+        let (mut last, mut sum) = (u32::MAX, 0.0);
         for (&[i, j], &f) in self.pairs.iter().zip(&self.forces) {
             let bulge = if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
-            self.bulges[i as usize] += bulge;
+            let there = self.bulges[i as usize];
+            sum = if i == last { sum } else { there } + bulge;
+            self.bulges[i as usize] = sum;
             self.bulges[j as usize] += bulge;
+            last = i;
         }
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         let widest = WIDEST_BULGE * packing.largest_radius();
         let mut largest: f64 = 0.0;
         self.absurd = None;
         for (particle, (bulge, radius)) in self.bulges.iter_mut().zip(packing.radii()).enumerate() {
-            *bulge *= radius / (2.0 * PI * self.line_tension);
+            *bulge *= WIDER * radius / (2.0 * PI * self.line_tension);
             if bulge.is_nan() || *bulge > widest {
                 self.absurd.get_or_insert((particle, *bulge));
                 *bulge = widest;
@@ -232,7 +288,7 @@ impl ContactLaw {
         let scale = self.scale();
         if let Some((particle, other)) = second_image(
             packing,
-            &self.contacts(),
+            &self.numbered(),
             self.line_tension,
             reach,
             ACCEPTED * self.allowed(scale),
@@ -260,11 +316,13 @@ impl ContactLaw {
             return;
         }
         self.others.clear();
-        let mut contacts = self.pairs.iter().peekable();
-        // Both ascend.
+        let in_order = self.pairs.len() - self.added.len();
+        let mut contacts = self.pairs[..in_order].iter().peekable();
+        self.added.sort_unstable();
+        // All ascend.
         for &pair in self.neighbors.pairs() {
             while contacts.next_if(|c| **c < pair).is_some() {}
-            if contacts.peek() != Some(&&pair) {
+            if contacts.peek() != Some(&&pair) && self.added.binary_search(&pair).is_err() {
                 self.others.push(pair);
             }
         }
@@ -276,19 +334,20 @@ impl ContactLaw {
         self.part();
         self.offending.clear();
         self.tolerated = 0.0;
-        let (radii, positions) = (packing.radii(), packing.positions());
-        let domain = packing.domain();
         let mut worst: f64 = 0.0;
-        for (contact, &f) in self.forces.iter().enumerate() {
-            if f <= 0.0 {
+        let rows = self.forces.iter().zip(self.matrix.scaling());
+        for (contact, (&f, &scaling)) in rows.enumerate() {
+            if f <= 0.0 && scaling > 0.0 {
                 self.offending
                     .push(Offence::Drop(contact, self.pairs[contact]));
                 worst = worst.max(-f * self.matrix.diagonal()[contact]);
             }
         }
-        let drops = self.offending.len();
-        self.work.distances += self.others.len() as u64;
-        for &pair in &self.others {
+        self.work.distances += (self.others.len() + self.at_rest.len()) as u64;
+        let (radii, positions) = (packing.radii(), packing.positions());
+        let domain = packing.domain();
+        let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
+        for pair in self.others.iter().copied().chain(at_rest) {
             let [i, j] = [pair[0] as usize, pair[1] as usize];
             let separation = domain.minimum_image(positions[i] - positions[j]);
             let reach = radii[i] + radii[j] + self.bulges[i] + self.bulges[j];
@@ -308,69 +367,57 @@ impl ContactLaw {
                 self.tolerated = self.tolerated.max(-gap);
             }
         }
-        if drops > 0 && self.offending.len() > drops {
-            self.offending
-                .sort_unstable_by_key(|offence| offence.pair());
-        }
+        self.offending
+            .sort_unstable_by_key(|offence| offence.pair());
         worst
     }
 
     /// Exchanges the first `count` offending pairs between the two sides.
-    pub(super) fn exchange(&mut self, count: usize) {
+    ///
+    /// A contact that leaves is laid to rest where it is, and one that comes back is woken; others are added behind those
+    /// that there are. Neither touches the rest of the structure.
+    pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
-        if count == 0 {
+        let exchanged = &self.offending[..count];
+        let mut came: Vec<([u32; 2], f64)> = Vec::new();
+        for offence in exchanged {
+            match *offence {
+                Offence::Drop(contact, _) => {
+                    self.forces[contact] = 0.0;
+                    self.at_rest.push(contact as u32);
+                    self.matrix.set_at_rest(contact, true);
+                }
+                Offence::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
+                    Some(contact) => {
+                        self.forces[contact as usize] = guess;
+                        self.at_rest.retain(|c| *c != contact);
+                        self.matrix.set_at_rest(contact as usize, false);
+                    }
+                    None => came.push((pair, guess)),
+                },
+            }
+        }
+        if !matches!(self.solver, LinearSolver::ConjugateGradient(_))
+            || 32 * came.len() > self.pairs.len()
+        {
+            self.put_in_order(&came);
             return;
         }
-        self.kept.clear();
-        let mut begin = 0;
-        for offence in &self.offending[..count] {
-            let (end, then) = match *offence {
-                Offence::Drop(contact, _) => (contact, None),
-                Offence::Add(pair, _) => (self.pairs.partition_point(|p| *p < pair), Some(pair)),
-            };
-            let range = begin..end;
-            begin = end + usize::from(then.is_none());
-            self.kept.push(Kept { range, then });
+        for &(pair, guess) in &came {
+            self.pairs.push(pair);
+            self.forces.push(guess);
+            self.added.push(pair);
+            self.geometry.add(packing, pair);
+            self.matrix
+                .add(packing, &self.geometry, pair, self.line_tension);
         }
-        self.exchanged.clear();
-        let pairs = self.offending[..count].iter().map(|o| o.pair());
-        self.exchanged.extend(pairs);
-        let range = begin..self.pairs.len();
-        self.kept.push(Kept { range, then: None });
-        rearrange(&mut self.pairs, &self.kept, [0; 2]);
-        rearrange(&mut self.forces, &self.kept, 0.0);
-        let guesses = self.offending[..count].iter().filter_map(|o| match o {
-            Offence::Add(_, guess) => Some(guess),
-            Offence::Drop(..) => None,
-        });
-        for ((place, pair), guess) in arrivals(&self.kept).zip(guesses) {
-            self.pairs[place] = pair;
-            self.forces[place] = *guess;
-        }
-        self.structured = false;
-        self.part_again(count);
-    }
-
-    /// The pairs of the neighbour list that are not in the set, after the first `count` offending ones were exchanged.
-    fn part_again(&mut self, count: usize) {
-        const FEW: usize = 64;
-        if count > FEW {
-            self.parted = false;
-        }
-        for offence in &self.offending[..count.min(FEW)] {
-            let pair = offence.pair();
-            match (offence, self.others.binary_search(&pair)) {
-                // Only what the neighbour list holds.
-                (Offence::Drop(..), Err(place))
-                    if self.neighbors.pairs().binary_search(&pair).is_ok() =>
-                {
-                    self.others.insert(place, pair);
-                }
-                (Offence::Add(..), Ok(place)) => {
-                    self.others.remove(place);
-                }
-                _ => {}
-            }
+        // Both ascend.
+        let mut came = came.iter().map(|c| c.0).peekable();
+        if came.peek().is_some() {
+            self.others.retain(|pair| {
+                while came.next_if(|c| c < pair).is_some() {}
+                came.peek() != Some(pair)
+            });
         }
     }
 }

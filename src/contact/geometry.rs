@@ -1,12 +1,11 @@
 //! Where the contacts of a list are: normals, distances, overlaps, and the directions seen from each particle.
 
-use super::list::{ContactList, DuplicateContactList};
+use super::list::{ContactList, DuplicateContactList, Moved};
 use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
 use crate::wide::wide;
 use core::f64::consts::PI;
-use core::ops::Range;
 
 /// Where the contacts of a list are: one entry a contact, in the list's order.
 ///
@@ -37,50 +36,6 @@ pub struct Geometry {
     /// The angles of the directions from the lower particle to the higher, likewise, and room for their making.
     angles: Vec<f64>,
     nodes: Vec<[f64; 2]>,
-    /// Room for [`exchange`](Self::exchange): the directions from the lower particles to the higher.
-    lower: Vec<Direction>,
-}
-
-/// A stretch of contacts that stay, and the pair that comes behind it.
-#[derive(Clone, Debug)]
-pub(crate) struct Kept {
-    pub(crate) range: Range<usize>,
-    pub(crate) then: Option<[u32; 2]>,
-}
-
-/// The contacts that come with an exchange, each with its number among those that there are then.
-pub(crate) fn arrivals(kept: &[Kept]) -> impl Iterator<Item = (usize, [u32; 2])> + '_ {
-    let mut end = 0;
-    kept.iter().filter_map(move |part| {
-        end += part.range.len();
-        let place = end;
-        end += usize::from(part.then.is_some());
-        part.then.map(|pair| (place, pair))
-    })
-}
-
-/// Moves the entries of contacts that stay to where an exchange puts them; those of new ones are anything, `fill` at first.
-pub(crate) fn rearrange<T: Copy>(column: &mut Vec<T>, kept: &[Kept], fill: T) {
-    let count = |part: &Kept| part.range.len() + usize::from(part.then.is_some());
-    let len = kept.iter().map(count).sum();
-    if column.len() < len {
-        column.resize(len, fill);
-    }
-    // What moves down from the front, what moves up from the back: nothing is overwritten before it has moved.
-    let mut end = 0;
-    for part in kept {
-        if end < part.range.start {
-            column.copy_within(part.range.clone(), end);
-        }
-        end += count(part);
-    }
-    for part in kept.iter().rev() {
-        end -= count(part);
-        if end > part.range.start {
-            column.copy_within(part.range.clone(), end);
-        }
-    }
-    column.truncate(len);
 }
 
 impl Geometry {
@@ -105,7 +60,8 @@ impl Geometry {
 
     pub(crate) fn rebuild(&mut self, packing: &Packing, contacts: &ContactList) {
         self.restructure(contacts);
-        self.refresh(packing, contacts);
+        let pairs: Vec<_> = contacts.pairs().collect();
+        self.refresh(packing, &pairs);
     }
 
     /// Takes over which particles touch; positions follow in [`refresh`](Self::refresh).
@@ -117,46 +73,64 @@ impl Geometry {
         self.toward.resize(2 * contacts.len(), NOWHERE);
     }
 
-    /// Computes everything anew for the positions of `packing`; `contacts` is the list that the structure is of.
-    pub(crate) fn refresh(&mut self, packing: &Packing, contacts: &ContactList) {
-        assert_eq!(packing.len(), contacts.particles(), "one list, one packing");
+    /// Adds one more contact at the positions of `packing`, with the next number.
+    pub(crate) fn add(&mut self, packing: &Packing, pair: [u32; 2]) {
+        let [i, j] = pair.map(|p| p as usize);
+        let (normal, distance) = unit_and_length(packing.separation(i, j));
+        self.normals.push(normal);
+        self.distances.push(distance);
+        let sum = packing.radii()[i] + packing.radii()[j];
+        self.overlaps.push(sum - distance);
+        let direction = Direction::of(-normal);
+        let moved = self.duplicate.add(pair);
+        for (Moved { row, place }, toward) in
+            moved.into_iter().zip([direction, direction.opposite()])
+        {
+            let at = row.start + place;
+            self.toward.extend_from_within(row.start..at);
+            self.toward.push(toward);
+            self.toward.extend_from_within(at..row.end);
+        }
+    }
+
+    /// Computes everything anew for the positions of `packing`; `pairs` are the contacts that the structure is of, in the
+    /// order of their numbers.
+    pub(crate) fn refresh(&mut self, packing: &Packing, pairs: &[[u32; 2]]) {
+        assert_eq!(
+            packing.len(),
+            self.duplicate.particles(),
+            "one list, one packing"
+        );
         wide(
             #[inline(always)]
-            || self.refresh_here(packing, contacts),
+            || self.refresh_here(packing, pairs),
         );
     }
 
     #[inline(always)]
-    fn refresh_here(&mut self, packing: &Packing, contacts: &ContactList) {
+    fn refresh_here(&mut self, packing: &Packing, pairs: &[[u32; 2]]) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
         let toward = &mut self.toward[..];
-        let slots = self.duplicate.slots();
         let angles = Angles::new();
-        let mut begin = 0;
-        // Some particles at a time, so that what is computed of them stays in the fastest memory.
-        for first in (0..packing.len()).step_by(TOGETHER) {
-            let group = first..packing.len().min(first + TOGETHER);
-            let count = contacts.count(group.clone());
-            let range = begin..begin + count;
-            begin += count;
-            if self.x.len() < count {
-                self.x.resize(count, 0.0);
-                self.y.resize(count, 0.0);
-                self.angles.resize(count, 0.0);
-            }
+        for column in [&mut self.x, &mut self.y, &mut self.angles] {
+            column.resize(TOGETHER, 0.0);
+        }
+        // Some contacts at a time, so that what is computed of them stays in the fastest memory.
+        let columns = self.distances.chunks_mut(TOGETHER);
+        let columns = columns.zip(self.overlaps.chunks_mut(TOGETHER));
+        let columns = columns.zip(self.normals.chunks_mut(TOGETHER));
+        let groups = pairs.chunks(TOGETHER);
+        let groups = groups.zip(self.duplicate.slots().chunks(TOGETHER));
+        for (((distances, overlaps), normals), (pairs, slots)) in columns.zip(groups) {
+            let count = pairs.len();
             let (x, y) = (&mut self.x[..count], &mut self.y[..count]);
-            let distances = &mut self.distances[range.clone()];
-            let overlaps = &mut self.overlaps[range.clone()];
-            let mut rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
-            for i in group {
-                let (position, radius) = (positions[i], radii[i]);
-                // The partners first: when they run out, no row is taken.
-                for (&j, ((x, y), overlap)) in contacts.partners(i).iter().zip(&mut rows) {
-                    let difference = position - positions[j as usize];
-                    (*x, *y) = (difference.x, difference.y);
-                    *overlap = radius + radii[j as usize];
-                }
+            let rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
+            for (&[i, j], ((x, y), overlap)) in pairs.iter().zip(rows) {
+                let (i, j) = (i as usize, j as usize);
+                let difference = positions[i] - positions[j];
+                (*x, *y) = (difference.x, difference.y);
+                *overlap = radii[i] + radii[j];
             }
             // One simple loop a quantity, so that each is done several contacts at a time.
             for x in &mut *x {
@@ -177,14 +151,12 @@ impl Geometry {
             for (overlap, r) in overlaps.iter_mut().zip(&*distances) {
                 *overlap -= r;
             }
-            let normals = &mut self.normals[range.clone()];
             for (normal, (x, y)) in normals.iter_mut().zip(x.iter_mut().zip(&mut *y)) {
                 *normal = Vec2::new(*x, *y);
                 (*x, *y) = (-*x, -*y);
             }
             let own = &mut self.angles[..count];
             angles.of_columns((x, y), &mut self.nodes, own);
-            let slots = &slots[range];
             for ((slots, angle), (x, y)) in slots.iter().zip(own).zip(x.iter().zip(&*y)) {
                 let direction = Direction {
                     cos: *x,
@@ -194,38 +166,6 @@ impl Geometry {
                 toward[slots[0] as usize] = direction;
                 toward[slots[1] as usize] = direction.opposite();
             }
-        }
-    }
-
-    /// Takes over other contacts at the same positions. `kept` are stretches of the contacts as they were, each but the
-    /// last followed by a new contact if it says so; only new contacts are computed.
-    pub(crate) fn exchange(&mut self, packing: &Packing, contacts: &ContactList, kept: &[Kept]) {
-        self.lower.clear();
-        let slots = self.duplicate.slots();
-        for part in kept {
-            let slots = &slots[part.range.clone()];
-            let toward = slots.iter().map(|s| self.toward[s[0] as usize]);
-            self.lower.extend(toward);
-            if part.then.is_some() {
-                self.lower.push(NOWHERE);
-            }
-        }
-        rearrange(&mut self.normals, kept, Vec2::zeros());
-        rearrange(&mut self.distances, kept, 0.0);
-        rearrange(&mut self.overlaps, kept, 0.0);
-        for (place, [i, j]) in arrivals(kept) {
-            let (i, j) = (i as usize, j as usize);
-            let (normal, distance) = unit_and_length(packing.separation(i, j));
-            self.normals[place] = normal;
-            self.lower[place] = Direction::of(-normal);
-            self.distances[place] = distance;
-            self.overlaps[place] = packing.radii()[i] + packing.radii()[j] - distance;
-        }
-        self.restructure(contacts);
-        let rows = self.lower.iter().zip(self.duplicate.slots());
-        for (direction, slots) in rows {
-            self.toward[slots[0] as usize] = *direction;
-            self.toward[slots[1] as usize] = direction.opposite();
         }
     }
 
@@ -294,30 +234,33 @@ impl Geometry {
         i: usize,
         j: usize,
     ) -> f64 {
-        let (normal, distance) = unit_and_length(packing.separation(i, j));
-        let overlap = packing.radii()[i] + packing.radii()[j] - distance;
-        let to_j = Direction::of(-normal);
-        let bulge = |p: usize, direction: Direction| {
-            let scale = packing.radii()[p] / (2.0 * PI * line_tension);
-            self.displacement(scale, p, direction, forces)
-        };
-        -overlap - bulge(i, to_j) - bulge(j, to_j.opposite())
-    }
-
-    /// `ΔR_p` in a direction, Saitoh (3): `scale Σ_k f_pk g(θ − θ_k)` with `scale = R_p / 2πγ`.
-    fn displacement(&self, scale: f64, p: usize, direction: Direction, forces: &[f64]) -> f64 {
-        let sum: f64 = self
-            .toward(p)
-            .iter()
-            .zip(self.duplicate.contacts(p))
-            .map(|(d, &c)| forces[c as usize] * direction.g_between(*d))
-            .sum();
-        scale * sum
+        gap_of(packing, line_tension, [i, j], |p| {
+            let contacts = self.duplicate.contacts(p).iter().zip(self.toward(p));
+            contacts.map(|(&c, toward)| (forces[c as usize], *toward))
+        })
     }
 }
 
-/// Particles whose contacts are computed together.
-const TOGETHER: usize = 256;
+/// [`Geometry::gap`] with the forces on a particle, and the directions they come from, given by `forces`.
+pub(super) fn gap_of<F: Iterator<Item = (f64, Direction)>>(
+    packing: &Packing,
+    line_tension: f64,
+    [i, j]: [usize; 2],
+    mut forces: impl FnMut(usize) -> F,
+) -> f64 {
+    let (normal, distance) = unit_and_length(packing.separation(i, j));
+    let overlap = packing.radii()[i] + packing.radii()[j] - distance;
+    let to_j = Direction::of(-normal);
+    // ΔR_p in a direction, Saitoh (3): (R_p / 2πγ) Σ_k f_pk g(θ − θ_k).
+    let mut bulge = |p: usize, direction: Direction| {
+        let sum: f64 = forces(p).map(|(f, d)| f * direction.g_between(d)).sum();
+        packing.radii()[p] / (2.0 * PI * line_tension) * sum
+    };
+    -overlap - bulge(i, to_j) - bulge(j, to_j.opposite())
+}
+
+/// Contacts that are computed together.
+const TOGETHER: usize = 512;
 
 const NOWHERE: Direction = Direction {
     cos: 0.0,
@@ -328,60 +271,34 @@ const NOWHERE: Direction = Direction {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// What an exchange does to a column, one entry after the other.
-    fn slowly(column: &[u32], kept: &[Kept]) -> Vec<u32> {
-        let mut out = Vec::new();
-        for part in kept {
-            out.extend_from_slice(&column[part.range.clone()]);
-            out.extend(part.then.map(|pair| pair[1]));
-        }
-        out
-    }
+    use crate::domain::Domain;
 
     #[test]
-    fn columns_are_rearranged_in_place_whichever_way_their_parts_move() {
-        // Five places, each left alone, dropped, or given one or two contacts before it: all 4⁵ exchanges.
-        for code in 0..1024u32 {
-            let (mut kept, mut begin) = (Vec::new(), 0);
-            for place in 0..5 {
-                let end = 3 * place + 1;
-                let then = Some([0, 100 + place as u32]);
-                match code >> (2 * place) & 3 {
-                    1 => {
-                        kept.push(Kept {
-                            range: begin..end,
-                            then: None,
-                        });
-                        begin = end + 1;
-                    }
-                    more @ 2.. => {
-                        kept.push(Kept {
-                            range: begin..end,
-                            then,
-                        });
-                        begin = end;
-                        if more == 3 {
-                            kept.push(Kept {
-                                range: end..end,
-                                then,
-                            });
-                        }
-                    }
-                    _ => {}
+    fn contacts_added_have_the_bits_of_contacts_that_were_there() {
+        let points = [(1.0, 1.0), (1.9, 1.3), (2.6, 1.9), (1.2, 1.9), (7.7, 0.8)];
+        let positions = points.map(|(x, y)| Vec2::new(x, y)).to_vec();
+        let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.6; 5], positions).unwrap();
+        let all = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 3]];
+        let whole = Geometry::of(&packing, &ContactList::new(5, &all).unwrap());
+        for late in [[0, 4], [0, 1], [1, 2]] {
+            let base: Vec<_> = all.into_iter().filter(|pair| *pair != late).collect();
+            let mut geometry = Geometry::of(&packing, &ContactList::new(5, &base).unwrap());
+            geometry.add(&packing, late);
+            let mut pairs = base;
+            pairs.push(late);
+            let mut refreshed = geometry.clone();
+            refreshed.refresh(&packing, &pairs);
+            for geometry in [geometry, refreshed] {
+                for p in 0..5 {
+                    let bits = |d: &Direction| [d.cos, d.sin, d.angle].map(f64::to_bits);
+                    let own = geometry.toward(p).iter().map(bits);
+                    assert!(own.eq(whole.toward(p).iter().map(bits)));
                 }
+                let place = all.iter().position(|pair| *pair == late).unwrap();
+                assert_eq!(geometry.normals()[4], whole.normals()[place]);
+                assert_eq!(geometry.overlaps()[4], whole.overlaps()[place]);
+                assert_eq!(geometry.distances()[4], whole.distances()[place]);
             }
-            kept.push(Kept {
-                range: begin..16,
-                then: None,
-            });
-            let column: Vec<u32> = (0..16).collect();
-            let mut quickly = column.clone();
-            rearrange(&mut quickly, &kept, 0);
-            for (place, pair) in arrivals(&kept) {
-                quickly[place] = pair[1];
-            }
-            assert_eq!(quickly, slowly(&column, &kept));
         }
     }
 }

@@ -3,14 +3,17 @@
 use super::Contacts;
 use super::complementarity::Offence;
 use super::error::ContactError;
-use super::geometry::Kept;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
+use super::present::Present;
 use super::patch::Patch;
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
+use crate::domain::Vec2;
+use crate::force::net_forces;
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
+use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
 ///
@@ -61,21 +64,27 @@ pub struct ContactLaw {
     pub(super) list: ContactList,
     pub(super) geometry: Geometry,
     pub(super) matrix: ContactMatrix,
+    /// The contacts by number: ascending when the structure is built, then those that came since, in the order in which they
+    /// came. Which numbers they have reaches no bit of a result.
     pub(super) pairs: Vec<[u32; 2]>,
+    /// Their forces; 0 for contacts at rest.
     pub(super) forces: Vec<f64>,
+    /// The numbers of the contacts that have left since the structure was built: they are at rest.
+    pub(super) at_rest: Vec<u32>,
+    /// Contacts that came since the structure was built.
+    pub(super) added: Vec<[u32; 2]>,
     /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
     pub(super) structured: bool,
     pub(super) refreshed: bool,
-    /// What the last exchange kept.
-    pub(super) kept: Vec<Kept>,
-    /// The pairs that came or went in the last exchange.
-    pub(super) exchanged: Vec<[u32; 2]>,
+    /// The contacts in their order, if somebody asked for them.
+    pub(super) present: OnceLock<Present>,
     /// The neighbour list without `pairs`, and whether it is up to date.
     pub(super) others: Vec<[u32; 2]>,
     pub(super) parted: bool,
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
+    pub(super) halves: Vec<[f64; 2]>,
     pub(super) bulges: Vec<f64>,
     /// The largest bulge that the neighbour list is known to cover at the present positions.
     pub(super) covered: f64,
@@ -153,14 +162,16 @@ impl ContactLaw {
             matrix: ContactMatrix::default(),
             pairs: Vec::new(),
             forces: Vec::new(),
+            at_rest: Vec::new(),
+            added: Vec::new(),
             structured: false,
             refreshed: false,
-            kept: Vec::new(),
-            exchanged: Vec::new(),
+            present: OnceLock::new(),
             others: Vec::new(),
             parted: false,
             slack: 0.0,
             image: Vec::new(),
+            halves: Vec::new(),
             bulges: Vec::new(),
             covered: 0.0,
             tolerated: 0.0,
@@ -182,6 +193,15 @@ impl ContactLaw {
     /// ```
     #[must_use]
     pub fn contacts(&self) -> Contacts<'_> {
+        if self.is_in_order() {
+            self.numbered()
+        } else {
+            self.present().contacts()
+        }
+    }
+
+    /// The contacts in the order of their numbers, those at rest among them with no force.
+    pub(crate) fn numbered(&self) -> Contacts<'_> {
         Contacts {
             pairs: &self.pairs,
             normals: self.geometry.normals(),
@@ -198,7 +218,44 @@ impl ContactLaw {
     /// ```
     #[must_use]
     pub fn matrix(&self) -> &ContactMatrix {
-        &self.matrix
+        if self.is_in_order() {
+            &self.matrix
+        } else {
+            self.present().matrix(&self.matrix)
+        }
+    }
+
+    /// The net force on each particle into `net`, `F_i = Σ_j f_ij n_ij` (force), summed in the order of its partners: the bits
+    /// of [`net_forces`] with [`contacts`](Self::contacts).
+    pub(crate) fn sum_forces(&self, net: &mut [Vec2]) {
+        let numbered = self.numbered();
+        net_forces(&numbered, net);
+        // A contact that came late is at the end of the numbers, and not in its place.
+        for &p in self.added.as_flattened() {
+            let duplicate = self.geometry.duplicate();
+            let partners = duplicate.partners(p as usize).iter();
+            let mut sum = Vec2::zeros();
+            for (&q, &c) in partners.zip(duplicate.contacts(p as usize)) {
+                let force = numbered.normals[c as usize] * numbered.forces[c as usize];
+                sum += if p < q { force } else { -force };
+            }
+            net[p as usize] = sum;
+        }
+    }
+
+    /// Number of contacts.
+    pub(super) fn contact_count(&self) -> usize {
+        self.pairs.len() - self.at_rest.len()
+    }
+
+    /// Whether the numbers of the contacts are their places in the order of pairs, and all are in contact.
+    pub(super) fn is_in_order(&self) -> bool {
+        self.at_rest.is_empty() && self.added.is_empty()
+    }
+
+    fn present(&self) -> &Present {
+        self.present
+            .get_or_init(|| Present::of(&self.numbered(), &self.matrix))
     }
 
     /// Line tension γ (force).
@@ -226,7 +283,20 @@ impl ContactLaw {
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<(), ContactError> {
-        self.solver.solve(&self.matrix, b, x, tolerance)?;
+        let matrix = if self.is_in_order() {
+            &self.matrix
+        } else {
+            let numbered = Contacts {
+                pairs: &self.pairs,
+                normals: self.geometry.normals(),
+                distances: self.geometry.distances(),
+                overlaps: self.geometry.overlaps(),
+                forces: &self.forces,
+            };
+            let present = self.present.get_or_init(|| Present::of(&numbered, &self.matrix));
+            present.matrix(&self.matrix)
+        };
+        self.solver.solve(matrix, b, x, tolerance)?;
         Ok(())
     }
 
@@ -240,9 +310,12 @@ impl ContactLaw {
     }
 
     fn take(&mut self, pairs: &[[u32; 2]], forces: &[f64]) {
-        if self.pairs != pairs {
+        self.present.take();
+        if !self.is_in_order() || self.pairs != pairs {
             self.pairs.clear();
             self.pairs.extend_from_slice(pairs);
+            self.at_rest.clear();
+            self.added.clear();
             (self.structured, self.parted) = (false, false);
         }
         self.forces.clear();
@@ -342,6 +415,7 @@ impl ContactLaw {
         f_max: f64,
         moved: f64,
     ) -> Result<(), ContactError> {
+        self.present.take();
         self.refreshed = false;
         self.moved += moved;
         self.slack = slack(packing, f_max);
@@ -351,7 +425,7 @@ impl ContactLaw {
             Rule::Seed => {
                 self.slack = 0.0;
                 self.sweep(packing)?;
-                self.exchange(self.offending.len());
+                self.exchange(packing, self.offending.len());
                 self.sweep(packing)?;
             }
         }
@@ -360,6 +434,7 @@ impl ContactLaw {
 
     /// Solves on at the positions solved last, to the tolerance that is due at `f_max` (units of γ).
     pub(crate) fn tighten(&mut self, packing: &Packing, f_max: f64) -> Result<(), ContactError> {
+        self.present.take();
         self.slack = slack(packing, f_max);
         self.settle(packing)?;
         self.check_answer(packing)
@@ -415,7 +490,7 @@ mod tests {
             of(&law.others),
             of(&law.offending),
             of(&law.bulges),
-            of(&law.kept),
+            of(&law.at_rest),
         ]
     }
 

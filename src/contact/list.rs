@@ -1,5 +1,7 @@
 //! The contact list and the duplicate contact list of Saitoh 2.2.2.
 
+use core::ops::Range;
+
 /// The contact list: for each particle `i` its partners `j > i`, ascending, all in one row.
 ///
 /// A contact's number is its place in this row; overlaps, forces and the rows of the matrix `A` follow the same
@@ -107,23 +109,6 @@ impl ContactList {
         &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
     }
 
-    /// Becomes `other`, in the memory that it has.
-    pub(crate) fn assign(&mut self, other: &Self) {
-        self.first.clone_from(&other.first);
-        self.partner.clone_from(&other.partner);
-    }
-
-    /// The pair of contact `c`, in O(log N).
-    pub(crate) fn pair(&self, c: usize) -> [u32; 2] {
-        let lower = self.first.partition_point(|f| *f as usize <= c);
-        [lower.saturating_sub(1) as u32, self.partner[c]]
-    }
-
-    /// Number of contacts whose lower particle is in `particles`.
-    pub(crate) fn count(&self, particles: core::ops::Range<usize>) -> usize {
-        (self.first[particles.end] - self.first[particles.start]) as usize
-    }
-
     /// All pairs `[i, j]`, `i < j`, in the order of the list.
     ///
     /// ```
@@ -151,12 +136,19 @@ impl ContactList {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DuplicateContactList {
-    first: Vec<u32>,
+    /// Where the row of each particle begins and ends.
+    rows: Vec<[u32; 2]>,
     partner: Vec<u32>,
     contact: Vec<u32>,
     /// Where contact c stands in the row of its lower and in that of its higher particle.
     slots: Vec<[u32; 2]>,
-    next: Vec<u32>,
+}
+
+/// A row before a contact came to it, and the place in it where the contact was put.
+#[derive(Clone, Debug)]
+pub(crate) struct Moved {
+    pub(crate) row: Range<usize>,
+    pub(crate) place: usize,
 }
 
 impl DuplicateContactList {
@@ -176,28 +168,31 @@ impl DuplicateContactList {
 
     pub(crate) fn rebuild(&mut self, contacts: &ContactList) {
         let particles = contacts.particles();
-        self.first.clear();
-        self.first.resize(particles + 1, 0);
+        self.rows.clear();
+        self.rows.resize(particles, [0; 2]);
         for i in 0..particles {
             let partners = contacts.partners(i);
-            self.first[i + 1] += partners.len() as u32;
+            self.rows[i][0] += partners.len() as u32;
             for &j in partners {
-                self.first[j as usize + 1] += 1;
+                self.rows[j as usize][0] += 1;
             }
         }
-        for i in 0..particles {
-            self.first[i + 1] += self.first[i];
+        let mut end = 0;
+        for row in &mut self.rows {
+            let begin = end;
+            end += row[0];
+            *row = [begin; 2];
         }
-        self.next.clear();
-        self.next.extend_from_slice(&self.first);
+        self.partner.clear();
         self.partner.resize(2 * contacts.len(), 0);
+        self.contact.clear();
         self.contact.resize(2 * contacts.len(), 0);
         self.slots.resize(contacts.len(), [0; 2]);
-        let (next, partner, contact) = (&mut *self.next, &mut *self.partner, &mut *self.contact);
+        let (rows, partner, contact) = (&mut *self.rows, &mut *self.partner, &mut *self.contact);
         let mut place = |c: u32, p: u32, q: u32| {
-            let next = &mut next[p as usize];
-            let slot = *next;
-            *next += 1;
+            let end = &mut rows[p as usize][1];
+            let slot = *end;
+            *end += 1;
             (partner[slot as usize], contact[slot as usize]) = (q, c);
             slot
         };
@@ -210,6 +205,38 @@ impl DuplicateContactList {
         }
     }
 
+    /// Adds one more contact between two particles, with the next number: their rows move to the end, each with the new
+    /// partner in its place. Says where the rows were.
+    pub(crate) fn add(&mut self, pair: [u32; 2]) -> [Moved; 2] {
+        let number = self.slots.len() as u32;
+        self.slots.push([0; 2]);
+        let [i, j] = pair;
+        [[i, j], [j, i]].map(|[p, q]| {
+            let row = self.entries(p as usize);
+            let place = self.partners(p as usize).partition_point(|k| *k < q);
+            let (begin, at) = (self.partner.len(), row.start + place);
+            self.partner.extend_from_within(row.start..at);
+            self.partner.push(q);
+            self.partner.extend_from_within(at..row.end);
+            self.contact.extend_from_within(row.start..at);
+            self.contact.push(number);
+            self.contact.extend_from_within(at..row.end);
+            let end = self.partner.len();
+            self.rows[p as usize] = [begin as u32, end as u32];
+            for slot in begin..end {
+                let higher = usize::from(self.partner[slot] < p);
+                self.slots[self.contact[slot] as usize][higher] = slot as u32;
+            }
+            Moved { row, place }
+        })
+    }
+
+    /// The number of the contact between two particles.
+    pub(crate) fn find(&self, [i, j]: [u32; 2]) -> Option<u32> {
+        let place = self.partners(i as usize).iter().position(|k| *k == j)?;
+        Some(self.contacts(i as usize)[place])
+    }
+
     /// Where each contact stands in the row of its lower and in that of its higher particle.
     pub(crate) fn slots(&self) -> &[[u32; 2]] {
         &self.slots
@@ -217,12 +244,13 @@ impl DuplicateContactList {
 
     /// Number of particles.
     pub(crate) fn particles(&self) -> usize {
-        self.first.len().saturating_sub(1)
+        self.rows.len()
     }
 
     /// The entries of particle `i`, as a range into rows that are parallel to this list.
-    pub(crate) fn entries(&self, i: usize) -> core::ops::Range<usize> {
-        self.first[i] as usize..self.first[i + 1] as usize
+    pub(crate) fn entries(&self, i: usize) -> Range<usize> {
+        let [begin, end] = self.rows[i];
+        begin as usize..end as usize
     }
 
     /// All partners of particle `i`, ascending.
@@ -273,5 +301,34 @@ mod tests {
         assert_eq!(both.partners(1), [0, 2, 5, 7, 10]);
         assert_eq!(both.contacts(1), [0, 1, 2, 3, 4]);
         assert_eq!(both.partners(7), [1]);
+    }
+
+    #[test]
+    fn rows_with_contacts_added_are_those_of_a_list_made_with_them() {
+        let all = [[0, 1], [0, 4], [1, 2], [1, 4], [2, 3], [3, 4]];
+        for late in 0..1u32 << all.len() {
+            let is_late = |k: usize| late >> k & 1 == 1;
+            let numbers = 0..all.len();
+            let (first, then): (Vec<_>, Vec<_>) = numbers.partition(|k| !is_late(*k));
+            let base: Vec<_> = first.iter().map(|k| all[*k]).collect();
+            let mut list = DuplicateContactList::of(&ContactList::new(5, &base).unwrap());
+            // Added from the last to the first, so that they come before others.
+            let order: Vec<usize> = first.into_iter().chain(then.into_iter().rev()).collect();
+            for &k in &order[base.len()..] {
+                list.add(all[k]);
+            }
+            let whole = DuplicateContactList::of(&ContactList::new(5, &all).unwrap());
+            for p in 0..5 {
+                assert_eq!(list.partners(p), whole.partners(p));
+                let numbers = list.contacts(p).iter().map(|c| order[*c as usize] as u32);
+                assert!(numbers.eq(whole.contacts(p).iter().copied()));
+            }
+            for (c, &k) in order.iter().enumerate() {
+                assert_eq!(list.find(all[k]), Some(c as u32));
+                let [low, high] = list.slots()[c].map(|s| list.contact[s as usize] as usize);
+                assert_eq!((low, high), (c, c));
+            }
+            assert_eq!(list.find([2, 4]), None);
+        }
     }
 }

@@ -3,11 +3,12 @@
 pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
-use super::product::{Number, product, product_of_block, scale, scale_block};
+use super::product::{Number, alone, product, product_of_blocks, scale, scale_blocks};
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
-use crate::wide::{largest_magnitude, wide};
+use crate::wide::wide;
 use core::f64::consts::PI;
+use core::ops::Range;
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
 ///
@@ -44,30 +45,68 @@ use core::f64::consts::PI;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactMatrix {
     diagonal: Vec<f64>,
-    /// `A_cc^(−½)`.
+    /// `A_cc^(−½)`, and 0 for a contact that is at rest.
     scaling: Vec<f64>,
-    /// The largest `A_cc^½`.
+    /// A bound of `A_cc^½`.
     largest_root: f64,
+    /// Runs of blocks of one size, and how many of them were sorted.
+    runs: Vec<Run>,
+    sorted: usize,
     /// The particle of each block.
     particle: Vec<u32>,
-    /// Where each block's contacts and values begin, and where the last ends.
-    start: Vec<[u32; 2]>,
-    /// Stretches of blocks of one size: the number of contacts in a block, and the number of blocks.
-    runs: Vec<(usize, usize)>,
-    /// The contacts of the blocks.
-    contact: Vec<u32>,
+    /// The ends of contacts in the blocks: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
+    end: Vec<u32>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
-    /// Where the values of each particle's block begin, of those that have one.
-    value_of: Vec<u32>,
-    /// Room for [`exchange`](Self::exchange).
-    old: (Vec<f64>, Vec<u32>),
-    /// The block of each particle, [`NO_BLOCK`] where it has not two contacts.
+    /// The block of each particle, [`NO_BLOCK`] where it has no contact.
     block_of: Vec<u32>,
-    list: ContactList,
+    /// The particles of each contact.
+    pairs: Vec<[u32; 2]>,
+    /// Whether contacts were added, or are at rest.
+    changed: bool,
 }
 
-/// A particle with one contact couples it to none.
+/// Blocks of `size` contacts, one after the other in each of the columns, and where they begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Run {
+    size: usize,
+    count: usize,
+    block: usize,
+    end: usize,
+    value: usize,
+}
+
+impl Run {
+    fn of(size: usize, count: usize) -> Self {
+        Self {
+            size,
+            count,
+            ..Self::default()
+        }
+    }
+
+    fn ends(&self) -> Range<usize> {
+        self.end..self.end + self.size * self.count
+    }
+
+    fn values(&self) -> Range<usize> {
+        self.value..self.value + pairs_of(self.size) * self.count
+    }
+
+    /// The ends and the values of one block.
+    fn block(&self, place: usize) -> (Range<usize>, Range<usize>) {
+        let pairs = pairs_of(self.size);
+        let (end, value) = (self.end + self.size * place, self.value + pairs * place);
+        (end..end + self.size, value..value + pairs)
+    }
+}
+
+/// Number of pairs of `z` contacts.
+const fn pairs_of(z: usize) -> usize {
+    z * (z - 1) / 2
+}
+
+/// The block of a particle without a contact.
 const NO_BLOCK: u32 = u32::MAX;
 
 /// Particles whose blocks are sorted by size together.
@@ -117,79 +156,138 @@ impl ContactMatrix {
         duplicate: &DuplicateContactList,
         line_tension: f64,
     ) {
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let compliance = |sum: f64| -G_AT_CONTACT / (2.0 * PI * line_tension) * sum;
         let radii = packing.radii();
-        self.diagonal.resize(contacts.len(), 0.0);
-        let mut rows = self.diagonal.iter_mut();
-        for (i, radius) in radii.iter().enumerate() {
-            for (&j, compliance) in contacts.partners(i).iter().zip(&mut rows) {
-                let sum = radius + radii[j as usize];
-                *compliance = -G_AT_CONTACT * per_radius * sum;
-            }
+        self.diagonal.clear();
+        self.pairs.clear();
+        self.pairs.extend(contacts.pairs());
+        for [i, j] in contacts.pairs() {
+            self.diagonal
+                .push(compliance(radii[i as usize] + radii[j as usize]));
         }
+        self.largest_root = compliance(2.0 * packing.largest_radius()).sqrt();
         self.scaling.resize(contacts.len(), 0.0);
         wide(
             #[inline(always)]
             || {
                 for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
-                    *scaling = (1.0 / compliance).sqrt();
+                    *scaling = root_of_inverse(*compliance);
                 }
-                self.largest_root = largest_magnitude(&self.diagonal).sqrt();
             },
         );
-        self.sort_blocks(duplicate);
-        self.list.assign(contacts);
-        self.block_of.clear();
-        self.block_of.resize(radii.len(), NO_BLOCK);
-        self.start.clear();
-        self.contact.clear();
-        self.value_of.resize(radii.len(), 0);
-        let mut end = 0;
-        for (block, &p) in self.particle.iter().enumerate() {
-            let numbers = duplicate.contacts(p as usize);
-            self.start.push([self.contact.len() as u32, end]);
-            self.value_of[p as usize] = end;
-            self.contact.extend_from_slice(numbers);
-            end += (numbers.len() * (numbers.len() - 1) / 2) as u32;
-            self.block_of[p as usize] = block as u32;
-        }
-        self.start.push([self.contact.len() as u32, end]);
-        self.value.resize(end as usize, 0.0);
+        self.lay_out(duplicate);
     }
 
-    /// Takes over contacts that differ by some pairs, at the same positions: only the blocks of their particles are computed.
-    pub(crate) fn exchange(
+    /// Places for the blocks.
+    fn lay_out(&mut self, duplicate: &DuplicateContactList) {
+        self.changed = false;
+        self.sort_blocks(duplicate);
+        self.block_of.clear();
+        self.block_of.resize(duplicate.particles(), NO_BLOCK);
+        self.end.clear();
+        for (block, &p) in self.particle.iter().enumerate() {
+            self.block_of[p as usize] = block as u32;
+            self.end.extend(ends(duplicate, p));
+        }
+        let (mut block, mut end, mut value) = (0, 0, 0);
+        for run in &mut self.runs {
+            (run.block, run.end, run.value) = (block, end, value);
+            block += run.count;
+            (end, value) = (run.ends().end, run.values().end);
+        }
+        self.value.resize(value, 0.0);
+    }
+
+    /// Adds one more contact, with the next number: `geometry` has it already. Its particles' blocks move to the end.
+    pub(crate) fn add(
         &mut self,
         packing: &Packing,
-        contacts: &ContactList,
         geometry: &Geometry,
-        exchanged: &[[u32; 2]],
+        pair: [u32; 2],
         line_tension: f64,
     ) {
-        core::mem::swap(&mut self.value, &mut self.old.0);
-        core::mem::swap(&mut self.value_of, &mut self.old.1);
-        self.restructure(packing, contacts, geometry.duplicate(), line_tension);
-        let (old, old_of) = (&self.old.0, &mut self.old.1);
-        for &p in exchanged.as_flattened() {
-            old_of[p as usize] = u32::MAX;
-        }
+        self.changed = true;
         let per_radius = 1.0 / (2.0 * PI * line_tension);
-        let (mut block, mut values) = (0, &mut self.value[..]);
-        for &(z, count) in &self.runs {
-            let pairs = z * (z - 1) / 2;
-            for &p in &self.particle[block..block + count] {
-                let (own, rest) = values.split_at_mut(pairs);
-                values = rest;
-                let from = old_of[p as usize] as usize;
-                if let Some(old) = old.get(from..from + pairs) {
-                    own.copy_from_slice(old);
-                } else {
-                    let scale = -packing.radii()[p as usize] * per_radius;
-                    fill_block(scale, geometry.toward(p as usize), own);
-                }
-            }
-            block += count;
+        let radii = packing.radii();
+        let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
+        let compliance = -G_AT_CONTACT * per_radius * sum;
+        self.pairs.push(pair);
+        self.diagonal.push(compliance);
+        self.scaling.push(root_of_inverse(compliance));
+        for p in pair {
+            self.remove_block(p);
+            let run = Run {
+                size: geometry.duplicate().entries(p as usize).len(),
+                count: 1,
+                block: self.particle.len(),
+                end: self.end.len(),
+                value: self.value.len(),
+            };
+            self.block_of[p as usize] = run.block as u32;
+            self.particle.push(p);
+            self.end.extend(ends(geometry.duplicate(), p));
+            self.value.resize(run.values().end, 0.0);
+            let scale = -radii[p as usize] * per_radius;
+            let toward = geometry.toward(p as usize);
+            fill_block(scale, toward, &mut self.value[run.values()]);
+            self.runs.push(run);
         }
+    }
+
+    /// The run that the block of particle `p` is in, and its place there.
+    fn place_of(&self, p: u32) -> Option<(usize, usize)> {
+        let block = self.block_of[p as usize];
+        if block == NO_BLOCK {
+            return None;
+        }
+        let after = self.runs.partition_point(|run| run.block <= block as usize);
+        let run = after - 1;
+        Some((run, block as usize - self.runs[run].block))
+    }
+
+    /// Takes the block of particle `p` out of its run; the last one of the run fills the place.
+    fn remove_block(&mut self, p: u32) {
+        let Some((run, to)) = self.place_of(p) else {
+            return;
+        };
+        let run = &mut self.runs[run];
+        run.count -= 1;
+        let (from, z) = (run.count, run.size);
+        let moved = self.particle[run.block + from];
+        self.particle[run.block + to] = moved;
+        self.block_of[moved as usize] = (run.block + to) as u32;
+        let ends = run.end + z * from;
+        self.end.copy_within(ends..ends + z, run.end + z * to);
+        let values = run.value + pairs_of(z) * from;
+        self.value.copy_within(
+            values..values + pairs_of(z),
+            run.value + pairs_of(z) * to,
+        );
+    }
+
+    /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
+    pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
+        self.changed = true;
+        self.scaling[c] = if at_rest {
+            0.0
+        } else {
+            root_of_inverse(self.diagonal[c])
+        };
+    }
+
+    /// Whether the contacts are those that the structure was built of, in their order.
+    pub(crate) fn is_whole(&self) -> bool {
+        !self.changed
+    }
+
+    /// Number of particles.
+    pub(crate) fn particles(&self) -> usize {
+        self.block_of.len()
+    }
+
+    /// How many blocks stand alone because contacts were added.
+    pub(crate) fn stragglers(&self) -> usize {
+        self.runs.len() - self.sorted
     }
 
     /// The order of the blocks: within each stretch of particles by size, then by particle.
@@ -206,21 +304,22 @@ impl ContactMatrix {
                 next[size(p).min(SIZES - 1)] += 1;
             }
             let mut end = self.particle.len();
-            for (z, count) in next.iter_mut().enumerate().skip(2) {
+            for (z, count) in next.iter_mut().enumerate().skip(1) {
                 if *count > 0 && z <= LARGEST_SORTED {
-                    self.runs.push((z, *count));
+                    self.runs.push(Run::of(z, *count));
                 }
                 (*count, end) = (end, end + *count);
             }
             self.particle.resize(end, 0);
-            for p in stretch.clone().filter(|&p| size(p) > 1) {
+            for p in stretch.clone().filter(|&p| size(p) > 0) {
                 let slot = &mut next[size(p).min(SIZES - 1)];
                 self.particle[*slot] = p as u32;
                 *slot += 1;
             }
             let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
-            self.runs.extend(large.map(|z| (z, 1)));
+            self.runs.extend(large.map(|z| Run::of(z, 1)));
         }
+        self.sorted = self.runs.len();
     }
 
     /// The values, from the directions of the contacts.
@@ -234,25 +333,24 @@ impl ContactMatrix {
     #[inline(always)]
     fn refresh_here(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
-        let (mut block, mut value) = (0, 0);
-        for &(z, count) in &self.runs {
-            let pairs = z * (z - 1) / 2;
-            let particles = &self.particle[block..block + count];
-            let values = &mut self.value[value..value + count * pairs];
-            (block, value) = (block + count, value + count * pairs);
+        for run in &self.runs {
+            let particles = &self.particle[run.block..run.block + run.count];
+            let values = &mut self.value[run.values()];
             let blocks = particles.iter().map(|&p| {
                 let p = p as usize;
                 (-packing.radii()[p] * per_radius, geometry.toward(p))
             });
-            match z {
+            match run.size {
+                1 => {}
                 2 => fill::<2, 1>(blocks, values),
                 3 => fill::<3, 3>(blocks, values),
                 4 => fill::<4, 6>(blocks, values),
                 5 => fill::<5, 10>(blocks, values),
                 6 => fill::<6, 15>(blocks, values),
                 7 => fill::<7, 21>(blocks, values),
-                _ => {
-                    for ((scale, toward), values) in blocks.zip(values.chunks_exact_mut(pairs)) {
+                z => {
+                    let values = values.chunks_exact_mut(pairs_of(z));
+                    for ((scale, toward), values) in blocks.zip(values) {
                         fill_block(scale, toward, values);
                     }
                 }
@@ -298,7 +396,7 @@ impl ContactMatrix {
         &self.scaling
     }
 
-    /// The largest `A_cc^½`.
+    /// A bound of `A_cc^½`, from the largest radius.
     pub(crate) fn largest_root(&self) -> f64 {
         self.largest_root
     }
@@ -309,17 +407,15 @@ impl ContactMatrix {
     ///
     /// If there is no row `c`. See the example of [`ContactMatrix`].
     pub fn row(&self, c: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let blocks = self.list.pair(c).map(|p| self.block_of[p as usize]);
-        let blocks = blocks.into_iter().filter(|b| *b != NO_BLOCK);
-        blocks.flat_map(move |block| {
-            let [first, values] = self.start[block as usize].map(|s| s as usize);
-            let end = self.start[block as usize + 1][0] as usize;
-            let contacts = &self.contact[first..end];
-            let own = contacts.iter().position(|&k| k as usize == c).unwrap_or(0);
-            let others = contacts.iter().enumerate().filter(move |(k, _)| *k != own);
-            others.map(move |(k, &column)| {
+        let places = self.pairs[c].map(|p| self.place_of(p));
+        places.into_iter().flatten().flat_map(move |(run, place)| {
+            let (ends, values) = self.runs[run].block(place);
+            let ends = &self.end[ends];
+            let own = ends.iter().position(|e| *e as usize / 2 == c).unwrap_or(0);
+            let others = ends.iter().enumerate().filter(move |(k, _)| *k != own);
+            others.map(move |(k, &end)| {
                 let (a, b) = (own.min(k), own.max(k));
-                (column as usize, self.value[values + b * (b - 1) / 2 + a])
+                (end as usize / 2, self.value[values.start + pairs_of(b) + a])
             })
         })
     }
@@ -332,7 +428,45 @@ impl ContactMatrix {
     /// ```
     #[must_use]
     pub fn off_diagonals(&self) -> usize {
-        2 * self.value.len()
+        2 * self.runs.iter().map(|run| run.values().len()).sum::<usize>()
+    }
+
+    /// The matrix of those contacts alone that are not at rest: `order` has their numbers, and `contacts` them in this order.
+    pub(crate) fn of_some(
+        &self,
+        order: &[u32],
+        contacts: &ContactList,
+        duplicate: &DuplicateContactList,
+    ) -> Self {
+        let of_these = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
+        let mut some = Self {
+            diagonal: of_these(&self.diagonal),
+            scaling: of_these(&self.scaling),
+            pairs: contacts.pairs().collect(),
+            largest_root: self.largest_root,
+            ..Self::default()
+        };
+        some.lay_out(duplicate);
+        for block in 0..some.particle.len() {
+            let p = some.particle[block];
+            let (Some((from, place)), Some((to, at))) = (self.place_of(p), some.place_of(p)) else {
+                continue;
+            };
+            let (ends, values) = self.runs[from].block(place);
+            let numbers = duplicate.contacts(p as usize).iter();
+            let kept: Vec<usize> = numbers
+                .filter_map(|&k| {
+                    let c = order[k as usize];
+                    self.end[ends.clone()].iter().position(|e| e / 2 == c)
+                })
+                .collect();
+            let (_, own) = some.runs[to].block(at);
+            let couples = (1..kept.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+            for (value, (a, b)) in some.value[own].iter_mut().zip(couples) {
+                *value = self.value[values.start + pairs_of(kept[b]) + kept[a]];
+            }
+        }
+        some
     }
 
     /// `y = A x`.
@@ -346,72 +480,86 @@ impl ContactMatrix {
     /// ContactMatrix::default().multiply(&[], &mut []);
     /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        self.multiply_with(x, y, &mut Vec::new());
+    }
+
+    /// [`multiply`](Self::multiply) in the room of `halves`.
+    pub(crate) fn multiply_with(&self, x: &[f64], y: &mut [f64], halves: &mut Vec<[f64; 2]>) {
         wide(
             #[inline(always)]
-            || self.multiply_here(x, y),
+            || self.multiply_here(x, y, halves),
         );
     }
 
     /// [`multiply`](Self::multiply), to be inlined into loops that are compiled for wide vectors.
     #[inline(always)]
-    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64]) {
+    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64], halves: &mut Vec<[f64; 2]>) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
-        for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
-            *y = d * x;
+        halves.resize(n, [0.0; 2]);
+        self.products(&self.value, x, halves);
+        let rows = y.iter_mut().zip(x).zip(&self.diagonal);
+        for (((y, x), d), [lower, higher]) in rows.zip(halves) {
+            *y = (d * x + *lower) + *higher;
         }
-        self.add_off_diagonal(x, y);
     }
 
-    /// `y += (A − diag A) x`.
+    /// What the off-diagonal entries of `A` make of `x`, contact by contact: what comes from the others at its lower particle
+    /// and what comes from those at the higher. `values` are those of `A`, or others in their places.
+    ///
+    /// Each half is a sum in the order of the particle's partners, and the two are kept apart: whatever numbers the contacts
+    /// have and however the blocks are sorted, the bits are the same.
     #[inline(always)]
-    pub(crate) fn add_off_diagonal(&self, x: &[f64], y: &mut [f64]) {
-        self.add_product(&self.value, x, y);
-    }
-
-    /// `y += V x` with other values in the places of the off-diagonal entries: `values` are in their order.
-    #[inline(always)]
-    pub(crate) fn add_product<F: Number>(&self, values: &[F], x: &[F], y: &mut [F]) {
-        let (mut contacts, mut values) = (&self.contact[..], values);
-        for &(z, count) in &self.runs {
-            let (c, v);
-            (c, contacts) = contacts.split_at(count * z);
-            (v, values) = values.split_at(count * (z * (z - 1) / 2));
-            match z {
-                2 => product::<F, 2, 1>(c, v, x, y),
-                3 => product::<F, 3, 3>(c, v, x, y),
-                4 => product::<F, 4, 6>(c, v, x, y),
-                5 => product::<F, 5, 10>(c, v, x, y),
-                6 => product::<F, 6, 15>(c, v, x, y),
-                7 => product::<F, 7, 21>(c, v, x, y),
-                _ => product_of_block(c, v, x, y),
+    pub(crate) fn products<F: Number>(&self, values: &[F], x: &[F], halves: &mut [[F; 2]]) {
+        for run in &self.runs {
+            let (e, v) = (&self.end[run.ends()], &values[run.values()]);
+            match run.size {
+                1 => alone(e, halves),
+                2 => product::<F, 2, 1>(e, v, x, halves),
+                3 => product::<F, 3, 3>(e, v, x, halves),
+                4 => product::<F, 4, 6>(e, v, x, halves),
+                5 => product::<F, 5, 10>(e, v, x, halves),
+                6 => product::<F, 6, 15>(e, v, x, halves),
+                7 => product::<F, 7, 21>(e, v, x, halves),
+                z => product_of_blocks(z, e, v, x, halves),
             }
         }
     }
 
-    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1.
+    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. Those of
+    /// contacts at rest are 0.
     #[inline(always)]
     pub(crate) fn scale_off_diagonal(&self, scaled: &mut Vec<f32>) {
         scaled.resize(self.value.len(), 0.0);
-        let (mut contacts, mut values) = (&self.contact[..], &self.value[..]);
-        let mut scaled = &mut scaled[..];
-        for &(z, count) in &self.runs {
-            let (c, v, s);
-            (c, contacts) = contacts.split_at(count * z);
-            (v, values) = values.split_at(count * (z * (z - 1) / 2));
-            (s, scaled) = scaled.split_at_mut(count * (z * (z - 1) / 2));
-            let by = &self.scaling[..];
-            match z {
-                2 => scale::<2, 1>(c, v, by, s),
-                3 => scale::<3, 3>(c, v, by, s),
-                4 => scale::<4, 6>(c, v, by, s),
-                5 => scale::<5, 10>(c, v, by, s),
-                6 => scale::<6, 15>(c, v, by, s),
-                7 => scale::<7, 21>(c, v, by, s),
-                _ => scale_block(c, v, by, s),
+        let by = &self.scaling[..];
+        for run in &self.runs {
+            let (e, v) = (&self.end[run.ends()], &self.value[run.values()]);
+            let s = &mut scaled[run.values()];
+            match run.size {
+                1 => {}
+                2 => scale::<2, 1>(e, v, by, s),
+                3 => scale::<3, 3>(e, v, by, s),
+                4 => scale::<4, 6>(e, v, by, s),
+                5 => scale::<5, 10>(e, v, by, s),
+                6 => scale::<6, 15>(e, v, by, s),
+                7 => scale::<7, 21>(e, v, by, s),
+                z => scale_blocks(z, e, v, by, s),
             }
         }
     }
+}
+
+/// `A_cc^(−½)`.
+#[inline(always)]
+fn root_of_inverse(compliance: f64) -> f64 {
+    (1.0 / compliance).sqrt()
+}
+
+/// The ends of a particle's contacts, in the order of its partners.
+fn ends(duplicate: &DuplicateContactList, p: u32) -> impl Iterator<Item = u32> {
+    let partners = duplicate.partners(p as usize).iter();
+    let numbers = duplicate.contacts(p as usize).iter();
+    partners.zip(numbers).map(move |(q, c)| 2 * c + u32::from(*q < p))
 }
 
 /// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.

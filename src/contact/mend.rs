@@ -10,7 +10,8 @@
 //! Contacts beyond the patch keep their forces, so that none of them begins to pull; the gap of a pair depends on the
 //! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
 
-use super::complementarity::{Offence, WIDEST_BULGE};
+use super::complementarity::{Offence, WIDER, WIDEST_BULGE};
+use super::geometry::gap_of;
 use super::law::ContactLaw;
 use super::patch::{Added, GONE, NOWHERE, Patch, Whole};
 use super::tolerance::ACCEPTED;
@@ -29,11 +30,21 @@ impl ContactLaw {
         let known = self.pairs.len();
         patch.place.resize(known, NOWHERE);
         patch.block.resize(packing.len(), NOWHERE);
+        for &c in &self.at_rest {
+            patch.place[c as usize] = GONE;
+        }
         let settled = self.mend_in(packing, &mut patch);
         self.offending.clear();
         for &c in &patch.gone {
             self.offending
                 .push(Offence::Drop(c as usize, self.pairs[c as usize]));
+        }
+        for &c in &self.at_rest {
+            if patch.place[c as usize] != GONE {
+                let (pair, force) = (self.pairs[c as usize], self.forces[c as usize]);
+                self.offending.push(Offence::Add(pair, force));
+            }
+            patch.place[c as usize] = NOWHERE;
         }
         for (k, added) in patch.added.iter().enumerate() {
             if patch.place[known + k] != GONE {
@@ -46,7 +57,7 @@ impl ContactLaw {
         self.forces.truncate(known);
         patch.finish();
         self.patch = patch;
-        self.exchange(self.offending.len());
+        self.exchange(packing, self.offending.len());
         settled
     }
 
@@ -55,8 +66,8 @@ impl ContactLaw {
         for _ in 0..ROUNDS {
             self.work.patches += 1;
             self.disturb(packing, patch);
+            let most = self.contact_count() / 4;
             let (whole, forces) = self.whole(packing);
-            let most = whole.pairs.len() / 4;
             let Some((iterations, left)) = patch.descend(whole, forces, 0.5 * allowed, most) else {
                 return false;
             };
@@ -91,7 +102,7 @@ impl ContactLaw {
             let (contact, change) = match self.offending[at] {
                 Offence::Drop(contact, _) => {
                     patch.place[contact] = GONE;
-                    if contact < known {
+                    if contact < known && !self.is_at_rest(contact) {
                         patch.gone.push(contact as u32);
                     }
                     (contact, -core::mem::take(&mut self.forces[contact]))
@@ -119,7 +130,8 @@ impl ContactLaw {
         }
         patch.added_of.clear();
         for (k, added) in patch.added.iter().enumerate() {
-            patch.added_of.extend(added.pair.map(|p| [p, k as u32]));
+            let ([i, j], k) = (added.pair, k as u32);
+            patch.added_of.extend([[i, j, k], [j, i, k]]);
         }
         patch.added_of.sort_unstable();
         let (whole, _) = self.whole(packing);
@@ -141,7 +153,7 @@ impl ContactLaw {
                 bulge += if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
             }
             first = end;
-            bulge *= radii[p as usize] * per_radius;
+            bulge *= WIDER * radii[p as usize] * per_radius;
             if bulge.is_nan() || bulge > widest {
                 return false;
             }
@@ -174,15 +186,33 @@ impl ContactLaw {
             }
         }
         self.others = others;
+        let at_rest = core::mem::take(&mut self.at_rest);
+        for &c in &at_rest {
+            let pair = self.pairs[c as usize];
+            let near = pair.iter().any(|p| patch.block[*p as usize] != NOWHERE);
+            if near && patch.place[c as usize] == GONE {
+                self.inspect_pair(packing, patch, pair, tolerance);
+            }
+        }
+        self.at_rest = at_rest;
         for &c in &patch.gone {
             self.inspect_pair(packing, patch, self.pairs[c as usize], tolerance);
         }
+        // The same order whichever of them have numbers.
+        self.offending
+            .sort_unstable_by_key(|offence| offence.pair());
         true
+    }
+
+    /// Whether contact `c` was at rest before the exchanges that are being mended.
+    fn is_at_rest(&self, c: usize) -> bool {
+        self.matrix.scaling()[c] == 0.0
     }
 
     fn inspect_pair(&mut self, packing: &Packing, patch: &Patch, pair: [u32; 2], tolerance: f64) {
         let [i, j] = pair.map(|p| p as usize);
         let radii = packing.radii();
+        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let separation = packing.separation(i, j);
         let reach = radii[i] + radii[j] + self.bulges[i] + self.bulges[j];
         self.work.distances += 1;
@@ -190,19 +220,17 @@ impl ContactLaw {
             return;
         }
         self.work.gaps += 1;
-        let known = self.pairs.len();
-        let mut gap = self
-            .geometry
-            .gap(packing, self.line_tension, &self.forces, i, j);
-        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
-        let (normal, _) = unit_and_length(separation);
-        let to_j = Direction::of(-normal);
-        for (p, direction) in [(pair[0], to_j), (pair[1], to_j.opposite())] {
-            for (k, toward) in patch.added_of(p) {
-                let scale = radii[p as usize] * per_radius;
-                gap -= scale * self.forces[known + k] * direction.g_between(toward);
-            }
-        }
+        let whole = Whole {
+            packing,
+            geometry: &self.geometry,
+            pairs: &self.pairs,
+            per_radius,
+        };
+        let forces = &self.forces;
+        let gap = gap_of(packing, self.line_tension, [i, j], |p| {
+            let contacts = patch.contacts_of(whole, p as u32);
+            contacts.map(|(contact, toward)| (forces[contact], toward))
+        });
         if gap < -tolerance {
             let compliance = -G_AT_CONTACT * (radii[i] + radii[j]) * per_radius;
             self.offending.push(Offence::Add(pair, -gap / compliance));

@@ -29,6 +29,7 @@ pub mod list;
 pub mod matrix;
 mod mend;
 mod patch;
+mod present;
 pub(crate) mod product;
 pub mod solver;
 mod tolerance;

@@ -38,8 +38,8 @@ pub(super) struct Patch {
     /// The contacts of the structure that have left.
     pub(super) gone: Vec<u32>,
     pub(super) added: Vec<Added>,
-    /// `(particle, number in added)`, ascending.
-    pub(super) added_of: Vec<[u32; 2]>,
+    /// `(particle, partner, number in added)`, ascending.
+    pub(super) added_of: Vec<[u32; 3]>,
     /// The block of each particle, [`NOWHERE`] if it is not in the patch, and the particles of the blocks.
     pub(super) block: Vec<u32>,
     pub(super) particles: Vec<u32>,
@@ -53,6 +53,7 @@ pub(super) struct Patch {
     /// The contacts of the patch, with their vectors.
     pub(super) contacts: Vec<u32>,
     pub(super) rows: Vec<Row>,
+    room: Vec<(usize, Direction)>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -78,8 +79,9 @@ pub(super) struct Whole<'a> {
 impl Patch {
     /// The number of a pair that came and may have gone again.
     pub(super) fn find(&self, whole: Whole<'_>, pair: [u32; 2]) -> Option<usize> {
-        let gone = whole.pairs.binary_search(&pair).ok();
-        gone.or_else(|| self.find_added(pair).map(|k| whole.pairs.len() + k))
+        let numbered = whole.geometry.duplicate().find(pair);
+        let added = || self.find_added(pair).map(|k| whole.pairs.len() + k);
+        numbered.map(|c| c as usize).or_else(added)
     }
 
     pub(super) fn find_added(&self, pair: [u32; 2]) -> Option<usize> {
@@ -95,14 +97,41 @@ impl Patch {
             .map_or_else(|| self.added[contact - n].pair, |pair| *pair)
     }
 
-    /// The contacts that came to particle `p`, with their directions.
+    /// The contacts that came to particle `p`, with their directions, in the order of its partners.
     pub(super) fn added_of(&self, p: u32) -> impl Iterator<Item = (usize, Direction)> {
         let begin = self.added_of.partition_point(|a| a[0] < p);
         let of = self.added_of[begin..].iter().take_while(move |a| a[0] == p);
-        of.map(move |&[_, k]| {
+        of.map(move |&[_, _, k]| {
             let added = &self.added[k as usize];
             let toward = added.toward_from(p);
             (k as usize, toward)
+        })
+    }
+
+    /// The contacts of particle `p` and their directions, in the order of its partners, those that came among them.
+    pub(super) fn contacts_of<'a>(
+        &'a self,
+        whole: Whole<'a>,
+        p: u32,
+    ) -> impl Iterator<Item = (usize, Direction)> + 'a {
+        let (list, toward) = (whole.geometry.duplicate(), whole.geometry.toward(p as usize));
+        let partners = list.partners(p as usize).iter();
+        let numbered = partners.zip(list.contacts(p as usize)).zip(toward);
+        let mut numbered = numbered.map(|((q, c), d)| (*q, *c as usize, *d)).peekable();
+        let n = whole.pairs.len();
+        let added = self.added_of(p).map(move |(k, toward)| {
+            let [i, j] = self.added[k].pair;
+            (i + j - p, n + k, toward)
+        });
+        // Both ascend by the partner.
+        let mut added = added.peekable();
+        core::iter::from_fn(move || {
+            let first = match (numbered.peek(), added.peek()) {
+                (Some(a), Some(b)) if b.0 < a.0 => added.next(),
+                (Some(_), _) => numbered.next(),
+                (None, _) => added.next(),
+            };
+            first.map(|(_, contact, toward)| (contact, toward))
         })
     }
 
@@ -156,19 +185,12 @@ impl Patch {
         self.particles.push(p);
         let first = self.member.len();
         let i = p as usize;
-        let own = whole.geometry.duplicate().contacts(i);
-        for (&c, &toward) in own.iter().zip(whole.geometry.toward(i)) {
-            self.join(whole, c as usize, toward);
+        let mut contacts = core::mem::take(&mut self.room);
+        contacts.extend(self.contacts_of(whole, p));
+        for (contact, toward) in contacts.drain(..) {
+            self.join(whole, contact, toward);
         }
-        for at in self.added_of.partition_point(|a| a[0] < p)..self.added_of.len() {
-            let [q, k] = self.added_of[at];
-            if q != p {
-                break;
-            }
-            let added = &self.added[k as usize];
-            let toward = added.toward_from(p);
-            self.join(whole, whole.pairs.len() + k as usize, toward);
-        }
+        self.room = contacts;
         self.ends.push(self.member.len());
         let scale = -whole.packing.radii()[i] * whole.per_radius;
         let toward = &self.toward[first..];

@@ -1,4 +1,6 @@
 //! The loops over the blocks of [`ContactMatrix`](super::matrix::ContactMatrix), one for each size.
+//!
+//! A block names its contacts by their ends, `2c` or `2c + 1` for contact `c`.
 
 use core::ops::{AddAssign, Mul};
 
@@ -8,21 +10,21 @@ pub(crate) trait Number: Copy + Default + AddAssign + Mul<Output = Self> {}
 impl Number for f64 {}
 impl Number for f32 {}
 
-/// `y += A x` of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each.
+/// The products of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each, into the `halves` of their contacts.
 #[inline(always)]
 pub(super) fn product<F: Number, const Z: usize, const T: usize>(
-    contacts: &[u32],
+    ends: &[u32],
     values: &[F],
     x: &[F],
-    y: &mut [F],
+    halves: &mut [[F; 2]],
 ) {
-    let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
-    let x = &x[..y.len()];
-    // Numbers of contacts by value, so that each is checked once.
-    for (&c, v) in contacts.iter().zip(values) {
+    let (ends, values) = (ends.as_chunks::<Z>().0, values.as_chunks::<T>().0);
+    let x = &x[..halves.len()];
+    // Ends by value, so that the number of each contact is checked once.
+    for (&ends, v) in ends.iter().zip(values) {
         let mut at = [F::default(); Z];
-        for (at, c) in at.iter_mut().zip(c) {
-            *at = x[c as usize];
+        for (at, e) in at.iter_mut().zip(ends) {
+            *at = x[(e >> 1) as usize];
         }
         let mut sum = [F::default(); Z];
         for b in 1..Z {
@@ -32,20 +34,38 @@ pub(super) fn product<F: Number, const Z: usize, const T: usize>(
                 sum[b] += entry * at[a];
             }
         }
-        for (c, sum) in c.into_iter().zip(sum) {
-            y[c as usize] += sum;
+        for (e, sum) in ends.into_iter().zip(sum) {
+            halves[(e >> 1) as usize][(e & 1) as usize] = sum;
         }
     }
 }
 
-/// `y += A x` of one block of any size.
+/// [`product`] of blocks of one contact, which is coupled to no other there.
 #[inline(always)]
-pub(super) fn product_of_block<F: Number>(contacts: &[u32], values: &[F], x: &[F], y: &mut [F]) {
-    let mut values = values.iter();
-    for (b, &cb) in contacts.iter().enumerate() {
-        for (&ca, &entry) in contacts[..b].iter().zip(&mut values) {
-            y[ca as usize] += entry * x[cb as usize];
-            y[cb as usize] += entry * x[ca as usize];
+pub(super) fn alone<F: Number>(ends: &[u32], halves: &mut [[F; 2]]) {
+    let halves = halves.as_flattened_mut();
+    for e in ends {
+        halves[*e as usize] = F::default();
+    }
+}
+
+/// [`product`] of blocks of any size.
+#[inline(always)]
+pub(super) fn product_of_blocks<F: Number>(
+    size: usize,
+    ends: &[u32],
+    values: &[F],
+    x: &[F],
+    halves: &mut [[F; 2]],
+) {
+    let (mut values, halves) = (values.iter(), halves.as_flattened_mut());
+    for ends in ends.chunks_exact(size) {
+        for (b, &eb) in ends.iter().enumerate() {
+            halves[eb as usize] = F::default();
+            for (&ea, &entry) in ends[..b].iter().zip(&mut values) {
+                halves[ea as usize] += entry * x[(eb >> 1) as usize];
+                halves[eb as usize] += entry * x[(ea >> 1) as usize];
+            }
         }
     }
 }
@@ -53,17 +73,17 @@ pub(super) fn product_of_block<F: Number>(contacts: &[u32], values: &[F], x: &[F
 /// The entries of blocks of `Z` contacts, each times the numbers `by` of its row and its column.
 #[inline(always)]
 pub(super) fn scale<const Z: usize, const T: usize>(
-    contacts: &[u32],
+    ends: &[u32],
     values: &[f64],
     by: &[f64],
     scaled: &mut [f32],
 ) {
-    let (contacts, values) = (contacts.as_chunks::<Z>().0, values.as_chunks::<T>().0);
+    let (ends, values) = (ends.as_chunks::<Z>().0, values.as_chunks::<T>().0);
     let blocks = scaled.as_chunks_mut::<T>().0.iter_mut();
-    for ((c, v), scaled) in contacts.iter().zip(values).zip(blocks) {
+    for ((ends, v), scaled) in ends.iter().zip(values).zip(blocks) {
         let mut at = [0.0; Z];
-        for (at, c) in at.iter_mut().zip(c) {
-            *at = by[*c as usize];
+        for (at, e) in at.iter_mut().zip(ends) {
+            *at = by[(e >> 1) as usize];
         }
         for b in 1..Z {
             for a in 0..b {
@@ -74,13 +94,22 @@ pub(super) fn scale<const Z: usize, const T: usize>(
     }
 }
 
-/// [`scale`] of one block of any size.
+/// [`scale`] of blocks of any size.
 #[inline(always)]
-pub(super) fn scale_block(contacts: &[u32], values: &[f64], by: &[f64], scaled: &mut [f32]) {
+pub(super) fn scale_blocks(
+    size: usize,
+    ends: &[u32],
+    values: &[f64],
+    by: &[f64],
+    scaled: &mut [f32],
+) {
     let mut entries = values.iter().zip(scaled);
-    for (b, &cb) in contacts.iter().enumerate() {
-        for (&ca, (value, scaled)) in contacts[..b].iter().zip(&mut entries) {
-            *scaled = (value * (by[ca as usize] * by[cb as usize])) as f32;
+    for ends in ends.chunks_exact(size) {
+        for (b, eb) in ends.iter().enumerate() {
+            for (ea, (value, scaled)) in ends[..b].iter().zip(&mut entries) {
+                let by = by[(ea >> 1) as usize] * by[(eb >> 1) as usize];
+                *scaled = (value * by) as f32;
+            }
         }
     }
 }

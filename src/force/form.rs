@@ -2,7 +2,7 @@
 
 use super::net_forces;
 use super::turning::Turning;
-use crate::contact::Contacts;
+use crate::contact::{ContactLaw, Contacts};
 use crate::domain::Vec2;
 use crate::packing::Packing;
 
@@ -109,6 +109,16 @@ impl NetForces {
             let push = tangent(contacts.normals[c]) * (self.torques[c] / contacts.distances[c]);
             net[i as usize] += push;
             net[j as usize] -= push;
+        }
+    }
+
+    /// [`evaluate`](Self::evaluate) with the contacts that `law` found last; the same bits, and the contacts need not be put in
+    /// order for it.
+    pub(crate) fn evaluate_law(&mut self, law: &ContactLaw, packing: &Packing, net: &mut [Vec2]) {
+        if self.form == Form::Gradient {
+            self.evaluate(&law.contacts(), packing, law.line_tension(), net);
+        } else {
+            law.sum_forces(net);
         }
     }
 

@@ -321,9 +321,8 @@ impl Relaxation {
     }
 
     fn balance(&mut self) {
-        let gamma = self.law.line_tension();
         self.form
-            .evaluate(&self.law.contacts(), &self.packing, gamma, &mut self.net);
+            .evaluate_law(&self.law, &self.packing, &mut self.net);
         self.f_max = largest_force(&self.net) / self.law.line_tension();
     }
 

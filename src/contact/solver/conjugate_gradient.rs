@@ -14,8 +14,19 @@ pub struct ConjugateGradient {
     residual: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
+    halves: Vec<[f64; 2]>,
     largest: f64,
     single: Single,
+}
+
+/// How far a solution has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// To its end, after so many iterations.
+    Done(usize),
+    /// To where single precision ends, after so many iterations: double precision sums in the order of the contacts and needs a
+    /// matrix that [is whole](ContactMatrix::is_whole).
+    NeedsWhole(usize),
 }
 
 impl ConjugateGradient {
@@ -39,10 +50,79 @@ impl ConjugateGradient {
         forces: &mut [f64],
         tolerance: f64,
     ) -> Result<usize, SolverError> {
-        let (most, mut iterations) = (self.prepare(matrix), 0);
-        let mut quickly = true;
+        self.solve_to(matrix, overlaps, forces, tolerance, false)
+    }
+
+    /// [`solve`](Self::solve), `loosely` as in [`begin`](Self::begin).
+    pub(crate) fn solve_to(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        tolerance: f64,
+        loosely: bool,
+    ) -> Result<usize, SolverError> {
+        match self.begin(matrix, overlaps, forces, tolerance, loosely)? {
+            Progress::Done(iterations) => Ok(iterations),
+            Progress::NeedsWhole(iterations) => {
+                self.finish(matrix, overlaps, forces, tolerance, iterations)
+            }
+        }
+    }
+
+    /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
+    /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
+    /// above round-off: that saves a product with the matrix.
+    pub(crate) fn begin(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        tolerance: f64,
+        loosely: bool,
+    ) -> Result<Progress, SolverError> {
+        self.prepare(matrix);
+        let mut iterations = 0;
         loop {
             let before = self.largest;
+            self.largest = self.true_residual(matrix, overlaps, forces);
+            if self.largest <= tolerance {
+                return Ok(Progress::Done(iterations));
+            }
+            if !self.largest.is_finite() {
+                return Err(self.not_converged(tolerance, iterations));
+            }
+            if iterations == 0 {
+                self.single.take(matrix);
+            } else if self.largest > 0.5 * before {
+                return Ok(Progress::NeedsWhole(iterations));
+            }
+            let residual = &self.residual;
+            let corrected = self.single.correct(matrix, residual, forces, tolerance);
+            let Some((more, bound)) = corrected else {
+                return Ok(Progress::NeedsWhole(iterations));
+            };
+            iterations += more;
+            if loosely && bound <= tolerance {
+                self.largest = bound;
+                return Ok(Progress::Done(iterations));
+            }
+        }
+    }
+
+    /// Goes on in double precision, after so many `iterations`, to a residual that is computed anew from the solution.
+    pub(crate) fn finish(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        tolerance: f64,
+        mut iterations: usize,
+    ) -> Result<usize, SolverError> {
+        debug_assert!(matrix.is_whole(), "sums in the order of the contacts");
+        self.prepare(matrix);
+        let most = 100 + 10 * matrix.len();
+        loop {
             self.largest = self.true_residual(matrix, overlaps, forces);
             if self.largest <= tolerance {
                 return Ok(iterations);
@@ -50,75 +130,15 @@ impl ConjugateGradient {
             if iterations >= most || !self.largest.is_finite() {
                 return Err(self.not_converged(tolerance, iterations));
             }
-            if iterations == 0 {
-                self.single.take(matrix);
-            } else {
-                quickly &= self.largest <= 0.5 * before;
-            }
-            if quickly && let Some((more, _)) = self.correct(matrix, forces, tolerance) {
-                iterations += more;
-            } else {
-                iterations += self.descend(matrix, forces, tolerance, most - iterations)?;
-            }
+            iterations += self.descend(matrix, forces, tolerance, most - iterations)?;
         }
     }
 
-    /// [`solve`](Self::solve) to a tolerance far above round-off: the residual tested last is the recurrence's own with
-    /// an estimate of its round-off. Saves a product with the matrix.
-    pub(crate) fn solve_loosely(
-        &mut self,
-        matrix: &ContactMatrix,
-        overlaps: &[f64],
-        forces: &mut [f64],
-        tolerance: f64,
-    ) -> Result<usize, SolverError> {
-        let (most, mut iterations) = (self.prepare(matrix), 0);
-        loop {
-            let before = self.largest;
-            self.largest = self.true_residual(matrix, overlaps, forces);
-            if self.largest <= tolerance {
-                return Ok(iterations);
-            }
-            if iterations == 0 {
-                self.single.take(matrix);
-            } else if self.largest > 0.5 * before {
-                break;
-            }
-            let Some((more, bound)) = self.correct(matrix, forces, tolerance) else {
-                break;
-            };
-            iterations += more;
-            if bound <= tolerance {
-                self.largest = bound;
-                return Ok(iterations);
-            }
-        }
-        iterations += self.descend(matrix, forces, tolerance, most)?;
-        if self.largest <= tolerance {
-            Ok(iterations)
-        } else {
-            Err(self.not_converged(tolerance, iterations))
-        }
-    }
-
-    /// A round of the correction in single precision; see [`Single::correct`].
-    fn correct(
-        &mut self,
-        matrix: &ContactMatrix,
-        forces: &mut [f64],
-        tolerance: f64,
-    ) -> Option<(usize, f64)> {
-        let residual = &self.residual;
-        self.single.correct(matrix, residual, forces, tolerance)
-    }
-
-    /// Makes room; returns the most iterations that are tried.
-    fn prepare(&mut self, matrix: &ContactMatrix) -> usize {
+    fn prepare(&mut self, matrix: &ContactMatrix) {
         let n = matrix.len();
         for v in [&mut self.residual, &mut self.direction, &mut self.image] {
             v.resize(n, 0.0);
         }
-        100 + 10 * n
     }
 
     fn not_converged(&self, tolerance: f64, iterations: usize) -> SolverError {
@@ -134,18 +154,27 @@ impl ConjugateGradient {
         self.largest
     }
 
-    /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is).
+    /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); contacts at rest have none.
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
         let (residual, image) = (&mut self.residual[..], &mut self.image[..]);
+        let halves = &mut self.halves;
         wide(
             #[inline(always)]
             || {
                 if forces.iter().all(|f| *f == 0.0) {
                     image.fill(0.0);
                 } else {
-                    matrix.multiply_here(forces, image);
+                    matrix.multiply_here(forces, image, halves);
                 }
-                subtract(residual, overlaps, image)
+                if matrix.is_whole() {
+                    subtract(residual, overlaps, image)
+                } else {
+                    let at_rest = matrix.scaling();
+                    for (q, (d, s)) in image.iter_mut().zip(overlaps.iter().zip(at_rest)) {
+                        *q = if *s > 0.0 { *q } else { *d };
+                    }
+                    subtract(residual, overlaps, image)
+                }
             },
         )
     }
@@ -172,7 +201,7 @@ impl ConjugateGradient {
         tolerance: f64,
         most: usize,
     ) -> Result<usize, SolverError> {
-        let (diagonal, scaling) = (matrix.diagonal(), matrix.scaling());
+        let scaling = matrix.scaling();
         let mut rz = 0.0;
         for (r, s) in self.residual.iter().zip(scaling) {
             rz += r * r * (s * s);
@@ -180,14 +209,10 @@ impl ConjugateGradient {
         self.direction.fill(0.0);
         let mut beta = 0.0;
         for iteration in 1..=most {
-            turn(
-                &mut self.direction,
-                &mut self.image,
-                &self.residual,
-                (diagonal, scaling),
-                beta,
-            );
-            matrix.add_off_diagonal(&self.direction, &mut self.image);
+            for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(scaling) {
+                *p = r * (s * s) + beta * *p;
+            }
+            matrix.multiply_here(&self.direction, &mut self.image, &mut self.halves);
             let curvature = dot(&self.direction, &self.image);
             if curvature.is_nan() || curvature <= 0.0 {
                 let contact = largest_entry(&self.direction);
@@ -236,22 +261,6 @@ fn subtract(residual: &mut [f64], overlaps: &[f64], image: &[f64]) -> f64 {
         most = larger(most, r.abs());
     }
     most
-}
-
-/// The next direction `p = D⁻¹ r + β p`, and the diagonal's part of its image, `q = D p`.
-#[inline(always)]
-fn turn(
-    direction: &mut [f64],
-    image: &mut [f64],
-    residual: &[f64],
-    (diagonal, scaling): (&[f64], &[f64]),
-    beta: f64,
-) {
-    let rows = direction.iter_mut().zip(image).zip(residual);
-    for (((p, q), r), (d, s)) in rows.zip(diagonal.iter().zip(scaling)) {
-        *p = r * (s * s) + beta * *p;
-        *q = d * *p;
-    }
 }
 
 /// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` behind it. The sum has four chains.

@@ -11,6 +11,7 @@ mod single;
 
 pub use cholesky::SparseCholesky;
 pub use conjugate_gradient::ConjugateGradient;
+pub(crate) use conjugate_gradient::Progress;
 pub use gauss_jordan::GaussJordan;
 
 use super::matrix::ContactMatrix;
@@ -154,22 +155,6 @@ impl LinearSolver {
             Self::ConjugateGradient(cg) => cg.solve(matrix, overlaps, forces, tolerance),
             Self::SparseCholesky(cholesky) => cholesky.solve(matrix, overlaps, forces).map(|()| 0),
             Self::GaussJordan(dense) => dense.solve(matrix, overlaps, forces).map(|()| 0),
-        }
-    }
-
-    /// [`solve`](Self::solve) to a tolerance far above round-off.
-    pub(crate) fn solve_loosely(
-        &mut self,
-        matrix: &ContactMatrix,
-        overlaps: &[f64],
-        forces: &mut [f64],
-        tolerance: f64,
-    ) -> Result<usize, SolverError> {
-        match self {
-            Self::ConjugateGradient(cg) => cg.solve_loosely(matrix, overlaps, forces, tolerance),
-            Self::SparseCholesky(_) | Self::GaussJordan(_) => {
-                self.solve(matrix, overlaps, forces, tolerance)
-            }
         }
     }
 

@@ -9,8 +9,10 @@
 //! What is solved is `Â u = D^(−½) r / s` with `Â = D^(−½) A D^(−½)`, `D = diag A`, `Δf = s D^(−½) u`, and `s` the largest
 //! entry of `D^(−½) r`: no units, no number far from 1. It is the same as preconditioning with the diagonal.
 //!
-//! Sums have 16 chains within stretches of [`STRETCH`] contacts, and the stretches are added in double precision: one order,
-//! the same bits on every processor.
+//! **Sums without an order.** The contacts have other numbers in a run that goes on than in one that is taken up at a frame, and
+//! some of them are at rest. Inner products are therefore summed as integers: the products are rounded to a multiple of
+//! [`STEPS`]⁻¹ of the largest that there could be, and sums of integers are exact. The bits do not depend on numbers, gaps, wide
+//! vectors or anything but the contacts. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
 
 use crate::contact::matrix::ContactMatrix;
 use crate::wide::wide;
@@ -25,7 +27,18 @@ const ITERATIONS: usize = 60;
 /// precision, about one for each entry of a row. Where it matters the residual is computed anew in double precision.
 const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64);
 
-const STRETCH: usize = 1024;
+/// Products of an inner product are rounded to this part of a power of two above the largest one there could be. Three times as
+/// much, added to a number of magnitude up to it, leaves the number in the last bits, rounded to an integer.
+const STEPS: f32 = 4_194_304.0;
+
+/// The bits of 0 after that.
+const NONE: u32 = (3.0 * STEPS).to_bits();
+
+/// A bound of the sums of magnitudes in the rows of `Â`: no entry is above 1, few are above a quarter.
+const ROW: f32 = 64.0;
+
+/// Numbers that are summed before the sums are widened: 256 of up to [`STEPS`] in each of the chains.
+const STRETCH: usize = 256 * CHAINS;
 const CHAINS: usize = 16;
 
 /// The matrix and the vectors.
@@ -35,6 +48,7 @@ pub(super) struct Single {
     residual: Vec<f32>,
     direction: Vec<f32>,
     image: Vec<f32>,
+    halves: Vec<[f32; 2]>,
     correction: Vec<f32>,
 }
 
@@ -53,6 +67,7 @@ impl Single {
         ] {
             v.resize(matrix.len(), 0.0);
         }
+        self.halves.resize(matrix.len(), [0.0; 2]);
     }
 
     /// Corrects `forces`, which leave `residual` (length), so that it falls to `goal`, or as far as a round goes. Returns
@@ -92,28 +107,35 @@ impl Single {
         let target = (0.5 * goal / length).max(DEEPEST) as f32;
         self.direction.fill(0.0);
         self.correction.fill(0.0);
-        let (mut rr, mut beta) = (dot(&self.residual, &self.residual), 0.0);
+        // Bounds of the entries of residual, direction and image.
+        let (mut most_r, mut most_p) = (1.0, 0.0);
+        let ones = Products::below(most_r, most_r)?;
+        let squares = self.residual.iter().map(|r| ones.integer(*r, *r));
+        let (mut rr, mut beta) = (ones.value(squares.map(i64::from).sum()), 0.0);
         for iteration in 1..=ITERATIONS {
-            let rows = self.direction.iter_mut().zip(&mut self.image);
-            for ((p, q), r) in rows.zip(&self.residual) {
+            for (p, r) in self.direction.iter_mut().zip(&self.residual) {
                 *p = r + beta * *p;
-                *q = *p;
             }
-            matrix.add_product(&self.value, &self.direction, &mut self.image);
-            let curvature = dot(&self.direction, &self.image);
-            if curvature.is_nan() || curvature <= 0.0 {
+            most_p = most_r + beta.abs() * most_p;
+            matrix.products(&self.value, &self.direction, &mut self.halves);
+            let (curvature, most_q) =
+                collect(&mut self.image, &self.direction, &self.halves, most_p)?;
+            if curvature <= 0.0 {
                 return None;
             }
             let alpha = (rr / curvature) as f32;
-            let largest = advance(
+            let (next, largest) = advance(
                 &mut self.correction,
                 &mut self.residual,
                 (&self.direction, &self.image),
                 alpha,
-            );
-            let next = dot(&self.residual, &self.residual);
-            if largest <= target && next.is_finite() {
+                most_r + alpha.abs() * most_q,
+            )?;
+            if largest <= target {
                 let largest_correction = largest_magnitude(&self.correction);
+                if !largest_correction.is_finite() {
+                    return None;
+                }
                 for ((f, u), s) in forces.iter_mut().zip(&self.correction).zip(scaling) {
                     *f += f64::from(*u) * (scale * s);
                 }
@@ -121,41 +143,109 @@ impl Single {
                 return Some((iteration, (f64::from(largest) + rounding) * length));
             }
             beta = (next / rr) as f32;
-            rr = next;
+            (rr, most_r) = (next, largest);
         }
         None
     }
 }
 
-/// A move by `α` along the direction; returns the largest magnitude of the residual behind it.
+/// The image `q = p + (Â − 1) p` from its halves; returns `pᵀ q` and the largest `|q|`. `most` bounds `|p|`. `None` if a number
+/// is none, or out of hand.
+#[inline(always)]
+fn collect(
+    image: &mut [f32],
+    direction: &[f32],
+    halves: &[[f32; 2]],
+    most: f32,
+) -> Option<(f64, f32)> {
+    // No packing has rows of Â with such sums; of one that has, the products are too large for this scale.
+    let products = Products::below(most, ROW * most)?;
+    let (mut total, mut largest) = (0, [0; CHAINS]);
+    let stretches = image.chunks_mut(STRETCH).zip(direction.chunks(STRETCH));
+    for ((q, p), halves) in stretches.zip(halves.chunks(STRETCH)) {
+        let (q16, q_rest) = q.as_chunks_mut::<CHAINS>();
+        let (p16, p_rest) = p.as_chunks::<CHAINS>();
+        let (h16, h_rest) = halves.as_chunks::<CHAINS>();
+        let mut sums = [0; CHAINS];
+        for ((q, p), h) in q16.iter_mut().zip(p16).zip(h16) {
+            for k in 0..CHAINS {
+                q[k] = (p[k] + h[k][0]) + h[k][1];
+                sums[k] = products.add(sums[k], p[k], q[k]);
+                largest[k] = largest[k].max(magnitude(q[k]));
+            }
+        }
+        total += products.total(sums, q16.len());
+        for ((q, p), h) in q_rest.iter_mut().zip(p_rest).zip(h_rest) {
+            *q = (p + h[0]) + h[1];
+            total += i64::from(products.integer(*p, *q));
+            largest[0] = largest[0].max(magnitude(*q));
+        }
+    }
+    let largest = f32::from_bits(largest.into_iter().fold(0, u32::max));
+    (largest <= ROW * most).then(|| (products.value(total), largest))
+}
+
+/// A move by `α` along the direction; returns `rᵀ r` and the largest `|r|` behind it. `most` bounds `|r|`. `None` if a number is
+/// none, or out of hand.
 #[inline(always)]
 fn advance(
     correction: &mut [f32],
     residual: &mut [f32],
     (direction, image): (&[f32], &[f32]),
     alpha: f32,
-) -> f32 {
-    let rows = correction.iter_mut().zip(&mut *residual);
-    for ((u, r), (p, q)) in rows.zip(direction.iter().zip(image)) {
-        *u += alpha * p;
-        *r -= alpha * q;
+    most: f32,
+) -> Option<(f64, f32)> {
+    // A little more, for the rounding of the residual.
+    let products = Products::below(1.01 * most, 1.01 * most)?;
+    let (mut total, mut largest) = (0, [0; CHAINS]);
+    let moved = correction.chunks_mut(STRETCH);
+    let moved = moved.zip(residual.chunks_mut(STRETCH));
+    let by = direction.chunks(STRETCH).zip(image.chunks(STRETCH));
+    for ((u, r), (p, q)) in moved.zip(by) {
+        let (u16, u_rest) = u.as_chunks_mut::<CHAINS>();
+        let (r16, r_rest) = r.as_chunks_mut::<CHAINS>();
+        let (p16, p_rest) = p.as_chunks::<CHAINS>();
+        let (q16, q_rest) = q.as_chunks::<CHAINS>();
+        let mut sums = [0; CHAINS];
+        for ((u, r), (p, q)) in u16.iter_mut().zip(&mut *r16).zip(p16.iter().zip(q16)) {
+            for k in 0..CHAINS {
+                u[k] += alpha * p[k];
+                r[k] -= alpha * q[k];
+                sums[k] = products.add(sums[k], r[k], r[k]);
+                largest[k] = largest[k].max(magnitude(r[k]));
+            }
+        }
+        total += products.total(sums, r16.len());
+        let rest = u_rest.iter_mut().zip(r_rest).zip(p_rest.iter().zip(q_rest));
+        for ((u, r), (p, q)) in rest {
+            *u += alpha * p;
+            *r -= alpha * q;
+            total += i64::from(products.integer(*r, *r));
+            largest[0] = largest[0].max(magnitude(*r));
+        }
     }
-    largest_magnitude(residual)
+    let largest = f32::from_bits(largest.into_iter().fold(0, u32::max));
+    (largest <= 1.01 * most).then(|| (products.value(total), largest))
+}
+
+/// The bits of `|x|`: they order as the magnitudes do, and NaN comes above all.
+#[inline(always)]
+fn magnitude(x: f32) -> u32 {
+    x.to_bits() & 0x7fff_ffff
 }
 
 /// The largest `|x|`, NaN if there is one.
 #[inline(always)]
 fn largest_magnitude(v: &[f32]) -> f32 {
-    let larger = |m: f32, x: f32| if x > m || x.is_nan() { x } else { m };
     let (chunks, rest) = v.as_chunks::<CHAINS>();
-    let mut most = [0.0; CHAINS];
+    let mut most = [0; CHAINS];
     for x in chunks {
         for k in 0..CHAINS {
-            most[k] = larger(most[k], x[k].abs());
+            most[k] = most[k].max(magnitude(x[k]));
         }
     }
-    let most = most.into_iter().fold(0.0, larger);
-    rest.iter().map(|x| x.abs()).fold(most, larger)
+    let rest = rest.iter().map(|x| magnitude(*x));
+    f32::from_bits(most.into_iter().chain(rest).fold(0, u32::max))
 }
 
 /// The largest `|a b|`, NaN if there is one.
@@ -175,29 +265,54 @@ fn largest_product(a: &[f64], b: &[f64]) -> f64 {
     rest.fold(most, larger)
 }
 
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let mut total = 0.0;
-    for (a, b) in a.chunks(STRETCH).zip(b.chunks(STRETCH)) {
-        let (a_chunks, a_rest) = a.as_chunks::<CHAINS>();
-        let (b_chunks, b_rest) = b.as_chunks::<CHAINS>();
-        let mut sums = [0.0_f32; CHAINS];
-        for (x, y) in a_chunks.iter().zip(b_chunks) {
-            for k in 0..CHAINS {
-                sums[k] += x[k] * y[k];
-            }
-        }
-        let mut half = CHAINS / 2;
-        while half > 0 {
-            for k in 0..half {
-                sums[k] += sums[k + half];
-            }
-            half /= 2;
-        }
-        let rest: f32 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-        total += f64::from(sums[0] + rest);
+/// Products as integers: multiples of [`STEPS`]⁻¹ of a power of two above all of them.
+#[derive(Clone, Copy)]
+struct Products {
+    scale: f32,
+}
+
+impl Products {
+    /// For products of numbers with magnitudes up to `a` and up to `b`; `None` if one is no number or too far from 1.
+    #[inline(always)]
+    fn below(a: f32, b: f32) -> Option<Self> {
+        let most = a * b;
+        // The next exponent, and no fraction.
+        let above = || f32::from_bits((most.to_bits() & 0x7f80_0000) + 0x0080_0000);
+        let within = (1e-25..1e25).contains(&most);
+        within.then(|| Self {
+            scale: STEPS / above(),
+        })
     }
-    total
+
+    /// The product, with [`NONE`] added to its bits. Nothing but the product is rounded before it is made an integer.
+    #[inline(always)]
+    fn bits(self, x: f32, y: f32) -> u32 {
+        ((x * y) * self.scale + 3.0 * STEPS).to_bits()
+    }
+
+    #[inline(always)]
+    fn integer(self, x: f32, y: f32) -> i32 {
+        self.bits(x, y).wrapping_sub(NONE).cast_signed()
+    }
+
+    /// One more product in a chain.
+    #[inline(always)]
+    fn add(self, chain: u32, x: f32, y: f32) -> u32 {
+        chain.wrapping_add(self.bits(x, y))
+    }
+
+    /// The sum of chains of `length` products.
+    #[inline(always)]
+    fn total(self, chains: [u32; CHAINS], length: usize) -> i64 {
+        let added = NONE.wrapping_mul(length as u32);
+        let chain = |sum: u32| i64::from(sum.wrapping_sub(added).cast_signed());
+        chains.into_iter().map(chain).sum()
+    }
+
+    #[inline(always)]
+    fn value(self, total: i64) -> f64 {
+        total as f64 / f64::from(self.scale)
+    }
 }
 
 #[cfg(test)]
@@ -243,7 +358,7 @@ mod tests {
                 if far_above_round_off {
                     forces.fill(0.0);
                     solver
-                        .solve_loosely(matrix, overlaps, &mut forces, tolerance)
+                        .solve_to(matrix, overlaps, &mut forces, tolerance, true)
                         .unwrap();
                     let (left, bound) = (
                         residual(matrix, overlaps, &forces),
@@ -273,7 +388,7 @@ mod tests {
             let mut forces = vec![0.0; 2];
             let mut solver = ConjugateGradient::default();
             solver
-                .solve_loosely(&matrix, &overlaps, &mut forces, 1e-9)
+                .solve_to(&matrix, &overlaps, &mut forces, 1e-9, true)
                 .unwrap();
             let left = residual(&matrix, &overlaps, &forces);
             assert!(left <= 1e-9, "{left:e} at {angle:e}");

@@ -188,7 +188,7 @@ fn solve(
     largest: f64,
 ) -> bool {
     let solved = if tolerance >= FAR_ABOVE_ROUND_OFF {
-        solver.solve_loosely(matrix, b, x, tolerance * largest)
+        solver.solve_to(matrix, b, x, tolerance * largest, true)
     } else {
         solver.solve(matrix, b, x, tolerance * largest)
     };

@@ -56,6 +56,7 @@ use crate::contact::solver::ConjugateGradient;
 use crate::domain::Vec2;
 use crate::force::NetForces;
 use crate::packing::Packing;
+use crate::wide::{largest_magnitude, wide};
 use gmres::{Gmres, Report};
 use linear::Linear;
 use stiffness::Stiffness;
@@ -163,6 +164,14 @@ impl Newton {
     /// grown.
     pub(super) fn is_due(f_max: f64, law: &ContactLaw, goes_on: bool) -> bool {
         let most = if goes_on { GROWTH * SWITCH } else { SWITCH };
+        let largest = wide(
+            #[inline(always)]
+            || largest_magnitude(law.numbered().forces),
+        );
+        // Not by the largest force, with some room for rounding, and so not by the mean.
+        if f_max * law.line_tension() > 1.001 * most * largest {
+            return false;
+        }
         let forces = law.contacts().forces;
         let sum: f64 = forces.iter().sum();
         f_max * law.line_tension() * forces.len() as f64 <= most * sum
