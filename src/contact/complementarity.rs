@@ -15,8 +15,9 @@
 //! # Which pairs are looked at
 //!
 //! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
-//! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over,
-//! by an exact comparison: how far the neighbour list reaches cannot change a bit of the answer.
+//! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over. Their
+//! gaps are positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too
+//! wide (see [`bulges`](super::bulges)), cannot change a bit of the answer.
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
@@ -26,16 +27,13 @@ use super::law::ContactLaw;
 use super::present::in_order;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
-use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
+use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
 use crate::wide::wide;
 use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
-
-/// How much wider than its sum a bound of a bulge is taken, for the rounding of the sum.
-pub(super) const WIDER: f64 = 1.0 + 1e-12;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
 const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
@@ -186,6 +184,7 @@ impl ContactLaw {
         (self.pairs, self.forces) = contacts.into_iter().unzip();
         self.at_rest.clear();
         self.added.clear();
+        self.bulges.forget();
         (self.structured, self.parted) = (false, false);
     }
 
@@ -238,35 +237,18 @@ impl ContactLaw {
     }
 
     /// `B_i`, and a neighbour list that covers the largest of them.
-    ///
-    /// The sums run by the numbers of the contacts, so their last bits depend on these; the bounds are wider than that, and a
-    /// pair between one and the other is far apart.
     fn bound_bulges(&mut self, packing: &Packing) {
-        self.bulges.clear();
-        self.bulges.resize(packing.len(), 0.0);
-        // The sum of a lower particle is carried from pair to pair: it would else go through memory and back each time.
-        let (mut last, mut sum) = (u32::MAX, 0.0);
-        for (&[i, j], &f) in self.pairs.iter().zip(&self.forces) {
-            let bulge = if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
-            let there = self.bulges[i as usize];
-            sum = if i == last { sum } else { there } + bulge;
-            self.bulges[i as usize] = sum;
-            self.bulges[j as usize] += bulge;
-            last = i;
-        }
-        // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         let widest = WIDEST_BULGE * packing.largest_radius();
-        let mut largest: f64 = 0.0;
+        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
+        let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
+        self.bulges.bound(pairs, forces, packing.radii(), per_radius);
+        // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         self.absurd = None;
-        for (particle, (bulge, radius)) in self.bulges.iter_mut().zip(packing.radii()).enumerate() {
-            *bulge *= WIDER * radius / (2.0 * PI * self.line_tension);
-            if bulge.is_nan() || *bulge > widest {
-                self.absurd.get_or_insert((particle, *bulge));
-                *bulge = widest;
-            }
-            largest = largest.max(*bulge);
+        if self.bulges.largest().is_nan() || self.bulges.largest() > widest {
+            self.bulges.sum(pairs, forces, packing.radii(), per_radius);
+            self.absurd = self.bulges.cut(widest);
         }
-        self.cover(packing, largest);
+        self.cover(packing, self.bulges.largest());
     }
 
     /// A neighbour list that covers bulges up to `largest`.
@@ -284,7 +266,7 @@ impl ContactLaw {
 
     /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
-        let reach = |p: usize| packing.radii()[p] + self.bulges[p];
+        let reach = |p: usize| packing.radii()[p] + self.bulges.of(p);
         let scale = self.scale();
         if let Some((particle, other)) = second_image(
             packing,
@@ -350,7 +332,7 @@ impl ContactLaw {
         for pair in self.others.iter().copied().chain(at_rest) {
             let [i, j] = [pair[0] as usize, pair[1] as usize];
             let separation = domain.minimum_image(positions[i] - positions[j]);
-            let reach = radii[i] + radii[j] + self.bulges[i] + self.bulges[j];
+            let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
             if separation.norm_squared() >= reach * reach {
                 continue;
             }

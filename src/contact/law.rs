@@ -1,6 +1,7 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 
 use super::Contacts;
+use super::bulges::Bulges;
 use super::complementarity::Offence;
 use super::error::ContactError;
 use super::list::ContactList;
@@ -85,7 +86,7 @@ pub struct ContactLaw {
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
     pub(super) halves: Vec<[f64; 2]>,
-    pub(super) bulges: Vec<f64>,
+    pub(super) bulges: Bulges,
     /// The largest bulge that the neighbour list is known to cover at the present positions.
     pub(super) covered: f64,
     /// The largest overlap of contours outside the set that the tolerance lets pass (length).
@@ -172,7 +173,7 @@ impl ContactLaw {
             slack: 0.0,
             image: Vec::new(),
             halves: Vec::new(),
-            bulges: Vec::new(),
+            bulges: Bulges::default(),
             covered: 0.0,
             tolerated: 0.0,
             patch: Patch::default(),
@@ -316,6 +317,7 @@ impl ContactLaw {
             self.pairs.extend_from_slice(pairs);
             self.at_rest.clear();
             self.added.clear();
+            self.bulges.forget();
             (self.structured, self.parted) = (false, false);
         }
         self.forces.clear();
@@ -480,7 +482,7 @@ mod tests {
     use crate::domain::{Domain, Vec2};
 
     /// Where each buffer is, and how long it may get without moving.
-    fn buffers(law: &ContactLaw) -> [(usize, usize); 6] {
+    fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
         fn of<T>(v: &Vec<T>) -> (usize, usize) {
             (v.as_ptr() as usize, v.capacity())
         }
@@ -489,7 +491,6 @@ mod tests {
             of(&law.forces),
             of(&law.others),
             of(&law.offending),
-            of(&law.bulges),
             of(&law.at_rest),
         ]
     }

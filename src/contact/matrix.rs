@@ -496,12 +496,18 @@ impl ContactMatrix {
     pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64], halves: &mut Vec<[f64; 2]>) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
-        halves.resize(n, [0.0; 2]);
-        self.products(&self.value, x, halves);
+        self.off_diagonal_products(x, halves);
         let rows = y.iter_mut().zip(x).zip(&self.diagonal);
         for (((y, x), d), [lower, higher]) in rows.zip(halves) {
             *y = (d * x + *lower) + *higher;
         }
+    }
+
+    /// The [`products`](Self::products) of the off-diagonal entries of `A` itself.
+    #[inline(always)]
+    pub(crate) fn off_diagonal_products(&self, x: &[f64], halves: &mut Vec<[f64; 2]>) {
+        halves.resize(self.len(), [0.0; 2]);
+        self.products(&self.value, x, halves);
     }
 
     /// What the off-diagonal entries of `A` make of `x`, contact by contact: what comes from the others at its lower particle

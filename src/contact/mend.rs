@@ -10,7 +10,7 @@
 //! Contacts beyond the patch keep their forces, so that none of them begins to pull; the gap of a pair depends on the
 //! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
 
-use super::complementarity::{Offence, WIDER, WIDEST_BULGE};
+use super::complementarity::{Offence, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
 use super::patch::{Added, GONE, NOWHERE, Patch, Whole};
@@ -153,11 +153,11 @@ impl ContactLaw {
                 bulge += if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
             }
             first = end;
-            bulge *= WIDER * radii[p as usize] * per_radius;
+            bulge *= (1.0 + 1e-12) * radii[p as usize] * per_radius;
             if bulge.is_nan() || bulge > widest {
                 return false;
             }
-            self.bulges[p as usize] = bulge;
+            self.bulges.widen(p as usize, bulge);
             largest = largest.max(bulge);
         }
         if largest > self.covered {
@@ -214,7 +214,7 @@ impl ContactLaw {
         let radii = packing.radii();
         let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let separation = packing.separation(i, j);
-        let reach = radii[i] + radii[j] + self.bulges[i] + self.bulges[j];
+        let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
         self.work.distances += 1;
         if separation.norm_squared() >= reach * reach {
             return;

@@ -156,25 +156,12 @@ impl ConjugateGradient {
 
     /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); contacts at rest have none.
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
-        let (residual, image) = (&mut self.residual[..], &mut self.image[..]);
-        let halves = &mut self.halves;
         wide(
             #[inline(always)]
             || {
-                if forces.iter().all(|f| *f == 0.0) {
-                    image.fill(0.0);
-                } else {
-                    matrix.multiply_here(forces, image, halves);
-                }
-                if matrix.is_whole() {
-                    subtract(residual, overlaps, image)
-                } else {
-                    let at_rest = matrix.scaling();
-                    for (q, (d, s)) in image.iter_mut().zip(overlaps.iter().zip(at_rest)) {
-                        *q = if *s > 0.0 { *q } else { *d };
-                    }
-                    subtract(residual, overlaps, image)
-                }
+                matrix.off_diagonal_products(forces, &mut self.halves);
+                let columns = (overlaps, forces, &self.halves[..]);
+                subtract(&mut self.residual, matrix, columns)
             },
         )
     }
@@ -241,23 +228,36 @@ impl ConjugateGradient {
     }
 }
 
-/// `r = d − q`; returns the largest magnitude, NaN if any is.
+/// `r = δ − (A_cc f + the halves)`, 0 for contacts at rest; returns the largest magnitude, NaN if any is.
 #[inline(always)]
-fn subtract(residual: &mut [f64], overlaps: &[f64], image: &[f64]) -> f64 {
+fn subtract(
+    residual: &mut [f64],
+    matrix: &ContactMatrix,
+    (overlaps, forces, halves): (&[f64], &[f64], &[[f64; 2]]),
+) -> f64 {
     let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
+    let left = |d: f64, f: f64, h: [f64; 2], a: f64, s: f64| {
+        let r = d - ((a * f + h[0]) + h[1]);
+        if s > 0.0 { r } else { 0.0 }
+    };
     let (r8, r_rest) = residual.as_chunks_mut::<8>();
     let (d8, d_rest) = overlaps.as_chunks::<8>();
-    let (q8, q_rest) = image.as_chunks::<8>();
+    let (f8, f_rest) = forces.as_chunks::<8>();
+    let (h8, h_rest) = halves.as_chunks::<8>();
+    let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
+    let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
     let mut largest = [0.0; 8];
-    for ((r, d), q) in r8.iter_mut().zip(d8).zip(q8) {
+    let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(h8));
+    for (((r, d), (f, h)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
-            r[k] = d[k] - q[k];
+            r[k] = left(d[k], f[k], h[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
         }
     }
     let mut most = largest.into_iter().fold(0.0, larger);
-    for ((r, d), q) in r_rest.iter_mut().zip(d_rest).zip(q_rest) {
-        *r = d - q;
+    let rows = r_rest.iter_mut().zip(d_rest).zip(f_rest.iter().zip(h_rest));
+    for (((r, d), (f, h)), (a, s)) in rows.zip(a_rest.iter().zip(s_rest)) {
+        *r = left(*d, *f, *h, *a, *s);
         most = larger(most, r.abs());
     }
     most

@@ -1,0 +1,202 @@
+//! Bounds of the bulges: how far outside its undeformed disk a particle can reach.
+//!
+//! A bulge is at most `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`. A wider bound serves as well and costs a few gaps
+//! more, so the sums are not made in every step: each force is counted with something to spare, and only those that have
+//! outgrown it are added on. Bounds grow that way; from time to time they are summed anew.
+
+use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
+use crate::wide::wide;
+
+/// What a force is counted with to spare, in units of the mean force.
+const SPARE: f64 = 0.1;
+
+/// Steps that the bounds grow before they are summed anew.
+const LONGEST: u32 = 50;
+
+/// How much wider than its sum a bound is taken, for the rounding of the sum.
+const WIDER: f64 = 1.0 + 1e-12;
+
+/// Bounds of the bulges of all particles (length).
+#[derive(Clone, Debug, Default)]
+pub(super) struct Bulges {
+    bound: Vec<f64>,
+    largest: f64,
+    /// What each force is counted as, less `spare`.
+    counted: Vec<f64>,
+    spare: f64,
+    age: u32,
+}
+
+/// The force (positive) that bulges as much as `f`.
+#[inline(always)]
+fn equivalent(f: f64) -> f64 {
+    if f < 0.0 { G_AT_CONTACT / G_MAX * f } else { f }
+}
+
+impl Bulges {
+    /// The bound of particle `p`.
+    pub(super) fn of(&self, p: usize) -> f64 {
+        self.bound[p]
+    }
+
+    /// The largest bound there is; NaN if one is.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// The contacts have other numbers than before.
+    pub(super) fn forget(&mut self) {
+        self.age = LONGEST;
+    }
+
+    /// Bounds for the `forces` of `pairs`; `per_radius` is `1/2πγ`. Numbers of contacts are those of the last time, and
+    /// perhaps more, unless [`forget`](Self::forget) was called.
+    pub(super) fn bound(
+        &mut self,
+        pairs: &[[u32; 2]],
+        forces: &[f64],
+        radii: &[f64],
+        per_radius: f64,
+    ) {
+        self.age = self.age.saturating_add(1);
+        if self.age > LONGEST || self.bound.len() != radii.len() || forces.len() < self.counted.len()
+        {
+            let sum: f64 = forces.iter().map(|f| f.abs()).sum();
+            self.spare = SPARE * sum / forces.len().max(1) as f64;
+            self.sum_with(pairs, forces, radii, per_radius);
+            self.age = 0;
+            return;
+        }
+        // A contact that came since counts for nothing yet.
+        self.counted.resize(forces.len(), -self.spare);
+        let rows = forces.chunks(64).zip(self.counted.chunks_mut(64));
+        for ((forces, counted), pairs) in rows.zip(pairs.chunks(64)) {
+            let outgrown = wide(
+                #[inline(always)]
+                || {
+                    let mut within = true;
+                    for (f, counted) in forces.iter().zip(&*counted) {
+                        within &= equivalent(*f) <= counted + self.spare;
+                    }
+                    !within
+                },
+            );
+            if !outgrown {
+                continue;
+            }
+            for ((f, counted), pair) in forces.iter().zip(counted).zip(pairs) {
+                let f = equivalent(*f);
+                if f <= *counted + self.spare {
+                    continue;
+                }
+                for p in pair.map(|p| p as usize) {
+                    let growth = WIDER * G_MAX * (f - *counted) * (radii[p] * per_radius);
+                    self.bound[p] += growth;
+                    // A NaN stays.
+                    if self.bound[p] > self.largest || self.bound[p].is_nan() {
+                        self.largest = self.bound[p];
+                    }
+                }
+                *counted = f;
+            }
+        }
+    }
+
+    /// Bounds with nothing to spare.
+    pub(super) fn sum(
+        &mut self,
+        pairs: &[[u32; 2]],
+        forces: &[f64],
+        radii: &[f64],
+        per_radius: f64,
+    ) {
+        self.spare = 0.0;
+        self.sum_with(pairs, forces, radii, per_radius);
+        self.forget();
+    }
+
+    fn sum_with(&mut self, pairs: &[[u32; 2]], forces: &[f64], radii: &[f64], per_radius: f64) {
+        self.counted.clear();
+        self.counted.extend(forces.iter().map(|f| equivalent(*f)));
+        self.bound.clear();
+        self.bound.resize(radii.len(), 0.0);
+        for (&[i, j], f) in pairs.iter().zip(&self.counted) {
+            self.bound[i as usize] += f + self.spare;
+            self.bound[j as usize] += f + self.spare;
+        }
+        self.largest = 0.0;
+        for (bound, radius) in self.bound.iter_mut().zip(radii) {
+            *bound *= WIDER * G_MAX * (radius * per_radius);
+            if *bound > self.largest || bound.is_nan() {
+                self.largest = *bound;
+            }
+        }
+    }
+
+    /// Cuts the bounds at `widest`; returns the first particle whose bound was wider, or no number, with that bound.
+    pub(super) fn cut(&mut self, widest: f64) -> Option<(usize, f64)> {
+        let mut first = None;
+        for (particle, bound) in self.bound.iter_mut().enumerate() {
+            if bound.is_nan() || *bound > widest {
+                first.get_or_insert((particle, *bound));
+                *bound = widest;
+            }
+        }
+        self.largest = self.bound.iter().copied().fold(0.0, f64::max);
+        self.forget();
+        first
+    }
+
+    /// A particle's bound as it is known to be now.
+    pub(super) fn widen(&mut self, p: usize, bound: f64) {
+        if bound > self.bound[p] {
+            self.bound[p] = bound;
+            self.largest = self.largest.max(bound);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_stay_above_the_sums_while_forces_come_go_and_grow() {
+        let radii: Vec<f64> = (0..40).map(|p| 0.5 + 0.01 * f64::from(p)).collect();
+        let mut pairs: Vec<[u32; 2]> = (0..39).map(|p| [p, p + 1]).collect();
+        let mut bulges = Bulges::default();
+        let (mut sums, mut numbers) = (0, 0);
+        for step in 0..400 {
+            if step % 30 == 10 && pairs.len() < 60 {
+                let p = pairs.len() as u32 - 39;
+                pairs.push([p, p + 2]);
+            }
+            let force = |c: usize| {
+                let wave = libm::sin(0.37 * c as f64 + 0.021 * f64::from(step));
+                // Most grow and shrink, some are at rest, some pull.
+                if c % 7 == 3 { 0.0 } else { 0.2 + wave.max(-0.3) }
+            };
+            let forces: Vec<f64> = (0..pairs.len()).map(force).collect();
+            bulges.bound(&pairs, &forces, &radii, 0.16);
+            sums += u32::from(bulges.age == 0);
+            let mut exact = vec![0.0; 40];
+            for (pair, &f) in pairs.iter().zip(&forces) {
+                for p in pair.map(|p| p as usize) {
+                    let g = if f > 0.0 { G_MAX } else { G_AT_CONTACT };
+                    exact[p] += g * f * radii[p] * 0.16;
+                }
+            }
+            for (p, exact) in exact.iter().enumerate() {
+                assert!(bulges.of(p) >= *exact);
+                assert!(bulges.of(p) <= bulges.largest());
+                numbers += usize::from(bulges.of(p) > 2.0 * exact + 0.1);
+            }
+        }
+        assert!(sums < 10, "summed {sums} times");
+        assert!(numbers < 400 * 40 / 10, "{numbers} bounds are much too wide");
+        bulges.bound(&pairs, &vec![f64::NAN; pairs.len()], &radii, 0.16);
+        assert!(bulges.largest().is_nan());
+        assert_eq!(bulges.cut(1.0).map(|first| first.0), Some(0));
+        assert!(bulges.largest() <= 1.0);
+    }
+}
