@@ -24,6 +24,7 @@
 use super::error::ContactError;
 use super::images::second_image;
 use super::law::ContactLaw;
+use super::matrix::At;
 use super::present::in_order;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
@@ -107,8 +108,8 @@ impl ContactLaw {
     /// Forces of the present set, and the pairs that offend, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
-        self.assemble(packing);
-        let iterations = self.find_forces(packing)?;
+        let refreshed = self.assemble(packing);
+        let iterations = self.find_forces(packing, refreshed)?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
             Some(largest) => self.off = largest,
@@ -118,17 +119,19 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// Solves `A f = δ` of the present set; returns the iterations.
-    fn find_forces(&mut self, packing: &Packing) -> Result<usize, SolverError> {
+    /// Solves `A f = δ` of the present set; returns the iterations. `multiplied` says that `halves` are of the present forces.
+    fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
+        self.matrix.rescale();
         let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
         let forces = &mut self.forces[..];
         let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
             return self.solver.solve(matrix, overlaps, forces, tolerance);
         };
-        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
-        let iterations = match solver.begin(matrix, overlaps, forces, tolerance, loosely)? {
+        let goal = (tolerance, tolerance > FAR_ABOVE_ROUND_OFF * scale);
+        let halves = multiplied.then_some(&self.halves[..]);
+        let iterations = match solver.begin(matrix, overlaps, forces, goal, halves)? {
             Progress::Done(iterations) => return Ok(iterations),
             Progress::NeedsWhole(iterations) => iterations,
         };
@@ -141,8 +144,9 @@ impl ContactLaw {
         solver.finish(matrix, overlaps, &mut self.forces, tolerance, iterations)
     }
 
-    /// Geometry and matrix of the present set at the present positions; what still stands is not done again.
-    pub(super) fn assemble(&mut self, packing: &Packing) {
+    /// Geometry and matrix of the present set at the present positions; what still stands is not done again. Says whether it was
+    /// not, and `halves` are the products of `A` with the present forces.
+    pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
         if !self.refreshed && self.is_untidy() {
             self.put_in_order(&[]);
         }
@@ -154,14 +158,20 @@ impl ContactLaw {
             self.matrix
                 .restructure(packing, &self.list, duplicate, self.line_tension);
         }
-        if !(self.structured && self.refreshed) {
-            self.geometry.refresh(packing, &self.pairs);
+        let anew = !(self.structured && self.refreshed);
+        if anew {
+            let at = At {
+                packing,
+                forces: &self.forces,
+                per_radius: 1.0 / (2.0 * PI * self.line_tension),
+            };
             self.matrix
-                .refresh(packing, &self.geometry, self.line_tension);
+                .refresh(&mut self.geometry, at, &self.pairs, &mut self.halves);
             self.work.assemblies += 1;
             (self.structured, self.refreshed) = (true, true);
         }
         self.measure_scale();
+        anew
     }
 
     /// Whether so many contacts have left or come since the structure was built that it is time for a new one.

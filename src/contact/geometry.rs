@@ -1,11 +1,12 @@
 //! Where the contacts of a list are: normals, distances, overlaps, and the directions seen from each particle.
 
-use super::list::{ContactList, DuplicateContactList, Moved};
+use super::list::{ContactList, DuplicateContactList};
 use crate::domain::{Vec2, nearest};
 use crate::droplet::kernel::{Angles, Direction};
 use crate::packing::{Packing, unit_and_length};
 use crate::wide::wide;
 use core::f64::consts::PI;
+use core::ops::Range;
 
 /// Where the contacts of a list are: one entry a contact, in the list's order.
 ///
@@ -27,14 +28,12 @@ pub struct Geometry {
     normals: Vec<Vec2>,
     distances: Vec<f64>,
     overlaps: Vec<f64>,
+    /// The angles of the directions from the lower particle to the higher, those of `−n_ij`.
+    angles: Vec<f64>,
     duplicate: DuplicateContactList,
-    /// Parallel to the duplicate list: the direction from the particle to its partner.
-    toward: Vec<Direction>,
-    /// Components of the normals, for the loops of [`refresh`](Self::refresh).
+    /// Room for the components of the normals and the making of the angles.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// The angles of the directions from the lower particle to the higher, likewise, and room for their making.
-    angles: Vec<f64>,
     nodes: Vec<[f64; 2]>,
 }
 
@@ -61,7 +60,10 @@ impl Geometry {
     pub(crate) fn rebuild(&mut self, packing: &Packing, contacts: &ContactList) {
         self.restructure(contacts);
         let pairs: Vec<_> = contacts.pairs().collect();
-        self.refresh(packing, &pairs);
+        wide(
+            #[inline(always)]
+            || self.refresh(packing, &pairs, 0..pairs.len()),
+        );
     }
 
     /// Takes over which particles touch; positions follow in [`refresh`](Self::refresh).
@@ -70,59 +72,44 @@ impl Geometry {
         self.normals.resize(contacts.len(), Vec2::zeros());
         self.distances.resize(contacts.len(), 0.0);
         self.overlaps.resize(contacts.len(), 0.0);
-        self.toward.resize(2 * contacts.len(), NOWHERE);
+        self.angles.resize(contacts.len(), 0.0);
     }
 
     /// Adds one more contact at the positions of `packing`, with the next number.
     pub(crate) fn add(&mut self, packing: &Packing, pair: [u32; 2]) {
         let [i, j] = pair.map(|p| p as usize);
         let (normal, distance) = unit_and_length(packing.separation(i, j));
+        self.duplicate.add(self.normals.len() as u32, pair);
         self.normals.push(normal);
         self.distances.push(distance);
         let sum = packing.radii()[i] + packing.radii()[j];
         self.overlaps.push(sum - distance);
-        let direction = Direction::of(-normal);
-        let moved = self.duplicate.add(pair);
-        for (Moved { row, place }, toward) in
-            moved.into_iter().zip([direction, direction.opposite()])
-        {
-            let at = row.start + place;
-            self.toward.extend_from_within(row.start..at);
-            self.toward.push(toward);
-            self.toward.extend_from_within(at..row.end);
-        }
+        self.angles.push(Direction::of(-normal).angle);
     }
 
-    /// Computes everything anew for the positions of `packing`; `pairs` are the contacts that the structure is of, in the
-    /// order of their numbers.
-    pub(crate) fn refresh(&mut self, packing: &Packing, pairs: &[[u32; 2]]) {
-        assert_eq!(
-            packing.len(),
-            self.duplicate.particles(),
-            "one list, one packing"
-        );
-        wide(
-            #[inline(always)]
-            || self.refresh_here(packing, pairs),
-        );
-    }
-
+    /// Computes some of the contacts anew for the positions of `packing`; `pairs` are all of them.
+    ///
+    /// To be inlined into loops that are compiled for wide vectors.
     #[inline(always)]
-    fn refresh_here(&mut self, packing: &Packing, pairs: &[[u32; 2]]) {
+    pub(crate) fn refresh(
+        &mut self,
+        packing: &Packing,
+        pairs: &[[u32; 2]],
+        contacts: Range<usize>,
+    ) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let sides = packing.domain().lengths();
-        let toward = &mut self.toward[..];
         let angles = Angles::new();
-        for column in [&mut self.x, &mut self.y, &mut self.angles] {
+        for column in [&mut self.x, &mut self.y] {
             column.resize(TOGETHER, 0.0);
         }
         // Some contacts at a time, so that what is computed of them stays in the fastest memory.
-        let columns = self.distances.chunks_mut(TOGETHER);
-        let columns = columns.zip(self.overlaps.chunks_mut(TOGETHER));
-        let columns = columns.zip(self.normals.chunks_mut(TOGETHER));
-        let groups = pairs.chunks(TOGETHER);
-        let groups = groups.zip(self.duplicate.slots().chunks(TOGETHER));
-        for (((distances, overlaps), normals), (pairs, slots)) in columns.zip(groups) {
+        let columns = self.distances[contacts.clone()].chunks_mut(TOGETHER);
+        let columns = columns.zip(self.overlaps[contacts.clone()].chunks_mut(TOGETHER));
+        let columns = columns.zip(self.normals[contacts.clone()].chunks_mut(TOGETHER));
+        let groups = self.angles[contacts.clone()].chunks_mut(TOGETHER);
+        let groups = groups.zip(pairs[contacts].chunks(TOGETHER));
+        for (((distances, overlaps), normals), (own, pairs)) in columns.zip(groups) {
             let count = pairs.len();
             let (x, y) = (&mut self.x[..count], &mut self.y[..count]);
             let rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
@@ -155,17 +142,7 @@ impl Geometry {
                 *normal = Vec2::new(*x, *y);
                 (*x, *y) = (-*x, -*y);
             }
-            let own = &mut self.angles[..count];
             angles.of_columns((x, y), &mut self.nodes, own);
-            for ((slots, angle), (x, y)) in slots.iter().zip(own).zip(x.iter().zip(&*y)) {
-                let direction = Direction {
-                    cos: *x,
-                    sin: *y,
-                    angle: *angle,
-                };
-                toward[slots[0] as usize] = direction;
-                toward[slots[1] as usize] = direction.opposite();
-            }
         }
     }
 
@@ -217,9 +194,25 @@ impl Geometry {
         &self.duplicate
     }
 
-    /// The directions from particle `p` to its partners, in the order of the duplicate list.
-    pub(crate) fn toward(&self, p: usize) -> &[Direction] {
-        &self.toward[self.duplicate.entries(p)]
+    /// The direction in which an end of a contact points: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
+    #[inline(always)]
+    pub(crate) fn toward(&self, end: u32) -> Direction {
+        let c = (end >> 1) as usize;
+        let normal = self.normals[c];
+        let from_lower = Direction {
+            cos: -normal.x,
+            sin: -normal.y,
+            angle: self.angles[c],
+        };
+        let from_higher = from_lower.opposite();
+        if end & 1 == 0 { from_lower } else { from_higher }
+    }
+
+    /// The contacts of particle `p` with their partners and directions, in the order of the partners.
+    pub(crate) fn around(&self, p: usize) -> impl Iterator<Item = (u32, u32, Direction)> + '_ {
+        let partners = self.duplicate.partners(p).iter();
+        let contacts = partners.zip(self.duplicate.contacts(p));
+        contacts.map(move |(&q, &c)| (q, c, self.toward(2 * c + u32::from((q as usize) < p))))
     }
 
     /// The gap between the deformed contours of particles `i < j` that are not in contact (length):
@@ -235,8 +228,8 @@ impl Geometry {
         j: usize,
     ) -> f64 {
         gap_of(packing, line_tension, [i, j], |p| {
-            let contacts = self.duplicate.contacts(p).iter().zip(self.toward(p));
-            contacts.map(|(&c, toward)| (forces[c as usize], *toward))
+            self.around(p)
+                .map(|(_, c, toward)| (forces[c as usize], toward))
         })
     }
 }
@@ -262,12 +255,6 @@ pub(super) fn gap_of<F: Iterator<Item = (f64, Direction)>>(
 /// Contacts that are computed together.
 const TOGETHER: usize = 512;
 
-const NOWHERE: Direction = Direction {
-    cos: 0.0,
-    sin: 0.0,
-    angle: 0.0,
-};
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -287,12 +274,13 @@ mod tests {
             let mut pairs = base;
             pairs.push(late);
             let mut refreshed = geometry.clone();
-            refreshed.refresh(&packing, &pairs);
+            refreshed.refresh(&packing, &pairs, 0..pairs.len());
             for geometry in [geometry, refreshed] {
                 for p in 0..5 {
-                    let bits = |d: &Direction| [d.cos, d.sin, d.angle].map(f64::to_bits);
-                    let own = geometry.toward(p).iter().map(bits);
-                    assert!(own.eq(whole.toward(p).iter().map(bits)));
+                    let bits = |(q, _, d): (u32, u32, Direction)| {
+                        (q, [d.cos, d.sin, d.angle].map(f64::to_bits))
+                    };
+                    assert!(geometry.around(p).map(bits).eq(whole.around(p).map(bits)));
                 }
                 let place = all.iter().position(|pair| *pair == late).unwrap();
                 assert_eq!(geometry.normals()[4], whole.normals()[place]);

@@ -140,15 +140,6 @@ pub struct DuplicateContactList {
     rows: Vec<[u32; 2]>,
     partner: Vec<u32>,
     contact: Vec<u32>,
-    /// Where contact c stands in the row of its lower and in that of its higher particle.
-    slots: Vec<[u32; 2]>,
-}
-
-/// A row before a contact came to it, and the place in it where the contact was put.
-#[derive(Clone, Debug)]
-pub(crate) struct Moved {
-    pub(crate) row: Range<usize>,
-    pub(crate) place: usize,
 }
 
 impl DuplicateContactList {
@@ -187,31 +178,23 @@ impl DuplicateContactList {
         self.partner.resize(2 * contacts.len(), 0);
         self.contact.clear();
         self.contact.resize(2 * contacts.len(), 0);
-        self.slots.resize(contacts.len(), [0; 2]);
         let (rows, partner, contact) = (&mut *self.rows, &mut *self.partner, &mut *self.contact);
         let mut place = |c: u32, p: u32, q: u32| {
             let end = &mut rows[p as usize][1];
             let slot = *end;
             *end += 1;
             (partner[slot as usize], contact[slot as usize]) = (q, c);
-            slot
         };
         // Pairs ascend, so a particle meets first its lower partners and then its higher ones, each ascending.
-        let mut slots = (0..).zip(&mut self.slots);
-        for i in 0..particles as u32 {
-            for (&j, (c, slots)) in contacts.partners(i as usize).iter().zip(&mut slots) {
-                *slots = [place(c, i, j), place(c, j, i)];
-            }
+        for (c, [i, j]) in (0..).zip(contacts.pairs()) {
+            place(c, i, j);
+            place(c, j, i);
         }
     }
 
-    /// Adds one more contact between two particles, with the next number: their rows move to the end, each with the new
-    /// partner in its place. Says where the rows were.
-    pub(crate) fn add(&mut self, pair: [u32; 2]) -> [Moved; 2] {
-        let number = self.slots.len() as u32;
-        self.slots.push([0; 2]);
-        let [i, j] = pair;
-        [[i, j], [j, i]].map(|[p, q]| {
+    /// Adds contact `number` between two particles: their rows move to the end, each with the new partner in its place.
+    pub(crate) fn add(&mut self, number: u32, [i, j]: [u32; 2]) {
+        for [p, q] in [[i, j], [j, i]] {
             let row = self.entries(p as usize);
             let place = self.partners(p as usize).partition_point(|k| *k < q);
             let (begin, at) = (self.partner.len(), row.start + place);
@@ -221,25 +204,14 @@ impl DuplicateContactList {
             self.contact.extend_from_within(row.start..at);
             self.contact.push(number);
             self.contact.extend_from_within(at..row.end);
-            let end = self.partner.len();
-            self.rows[p as usize] = [begin as u32, end as u32];
-            for slot in begin..end {
-                let higher = usize::from(self.partner[slot] < p);
-                self.slots[self.contact[slot] as usize][higher] = slot as u32;
-            }
-            Moved { row, place }
-        })
+            self.rows[p as usize] = [begin as u32, self.partner.len() as u32];
+        }
     }
 
     /// The number of the contact between two particles.
     pub(crate) fn find(&self, [i, j]: [u32; 2]) -> Option<u32> {
         let place = self.partners(i as usize).iter().position(|k| *k == j)?;
         Some(self.contacts(i as usize)[place])
-    }
-
-    /// Where each contact stands in the row of its lower and in that of its higher particle.
-    pub(crate) fn slots(&self) -> &[[u32; 2]] {
-        &self.slots
     }
 
     /// Number of particles.
@@ -315,7 +287,8 @@ mod tests {
             // Added from the last to the first, so that they come before others.
             let order: Vec<usize> = first.into_iter().chain(then.into_iter().rev()).collect();
             for &k in &order[base.len()..] {
-                list.add(all[k]);
+                let number = order.iter().position(|o| *o == k).unwrap();
+                list.add(number as u32, all[k]);
             }
             let whole = DuplicateContactList::of(&ContactList::new(5, &all).unwrap());
             for p in 0..5 {
@@ -325,8 +298,6 @@ mod tests {
             }
             for (c, &k) in order.iter().enumerate() {
                 assert_eq!(list.find(all[k]), Some(c as u32));
-                let [low, high] = list.slots()[c].map(|s| list.contact[s as usize] as usize);
-                assert_eq!((low, high), (c, c));
             }
             assert_eq!(list.find([2, 4]), None);
         }

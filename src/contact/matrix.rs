@@ -3,8 +3,9 @@
 pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
-use super::product::{Number, alone, product, product_of_blocks, scale, scale_blocks};
-use crate::droplet::kernel::{Direction, G_AT_CONTACT};
+use super::fill::{Blocks, fill, fill_blocks};
+use super::product::{Number, alone, product, product_of_blocks};
+use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
 use crate::wide::wide;
 use core::f64::consts::PI;
@@ -58,6 +59,12 @@ pub struct ContactMatrix {
     end: Vec<u32>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
+    /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
+    scaled: Vec<f32>,
+    /// Whether `scaled` is of contacts that have come to rest or woken since.
+    stale: bool,
+    /// Where the runs and the contacts end whose (lower) particles are in a stretch.
+    stretches: Vec<[usize; 2]>,
     /// The block of each particle, [`NO_BLOCK`] where it has no contact.
     block_of: Vec<u32>,
     /// The particles of each contact.
@@ -145,7 +152,17 @@ impl ContactMatrix {
         line_tension: f64,
     ) {
         self.restructure(packing, contacts, geometry.duplicate(), line_tension);
-        self.refresh(packing, geometry, line_tension);
+        let forces = vec![0.0; contacts.len()];
+        let halves = &mut vec![[0.0; 2]; contacts.len()];
+        let at = At {
+            packing,
+            forces: &forces,
+            per_radius: 1.0 / (2.0 * PI * line_tension),
+        };
+        wide(
+            #[inline(always)]
+            || self.fill(at, geometry, 0..self.runs.len(), halves),
+        );
     }
 
     /// Everything that depends on which particles touch, and not on where they are.
@@ -196,6 +213,7 @@ impl ContactMatrix {
             (end, value) = (run.ends().end, run.values().end);
         }
         self.value.resize(value, 0.0);
+        self.scaled.resize(value, 0.0);
     }
 
     /// Adds one more contact, with the next number: `geometry` has it already. Its particles' blocks move to the end.
@@ -227,11 +245,18 @@ impl ContactMatrix {
             self.particle.push(p);
             self.end.extend(ends(geometry.duplicate(), p));
             self.value.resize(run.values().end, 0.0);
-            let scale = -radii[p as usize] * per_radius;
-            let toward = geometry.toward(p as usize);
-            fill_block(scale, toward, &mut self.value[run.values()]);
+            self.scaled.resize(run.values().end, 0.0);
             self.runs.push(run);
+            // The scaled values follow.
+            let ends = &self.end[run.ends()];
+            let scale = -radii[p as usize] * per_radius;
+            let couples = (1..ends.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+            for (value, (a, b)) in self.value[run.values()].iter_mut().zip(couples) {
+                let toward = geometry.toward(ends[a]);
+                *value = scale * toward.g_between(geometry.toward(ends[b]));
+            }
         }
+        self.stale = true;
     }
 
     /// The run that the block of particle `p` is in, and its place there.
@@ -259,15 +284,14 @@ impl ContactMatrix {
         let ends = run.end + z * from;
         self.end.copy_within(ends..ends + z, run.end + z * to);
         let values = run.value + pairs_of(z) * from;
-        self.value.copy_within(
-            values..values + pairs_of(z),
-            run.value + pairs_of(z) * to,
-        );
+        let place = run.value + pairs_of(z) * to;
+        self.value.copy_within(values..values + pairs_of(z), place);
+        self.scaled.copy_within(values..values + pairs_of(z), place);
     }
 
     /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
     pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
-        self.changed = true;
+        (self.changed, self.stale) = (true, true);
         self.scaling[c] = if at_rest {
             0.0
         } else {
@@ -295,6 +319,7 @@ impl ContactMatrix {
         const SIZES: usize = LARGEST_SORTED + 2;
         self.particle.clear();
         self.runs.clear();
+        self.stretches.clear();
         let size = |p: usize| duplicate.entries(p).len();
         let particles = duplicate.particles();
         for begin in (0..particles).step_by(STRETCH) {
@@ -316,44 +341,79 @@ impl ContactMatrix {
                 self.particle[*slot] = p as u32;
                 *slot += 1;
             }
+            let behind = stretch.end as u32;
             let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
             self.runs.extend(large.map(|z| Run::of(z, 1)));
+            let contacts = self.pairs.partition_point(|pair| pair[0] < behind);
+            self.stretches.push([self.runs.len(), contacts]);
         }
         self.sorted = self.runs.len();
     }
 
-    /// The values, from the directions of the contacts.
-    pub(crate) fn refresh(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
+    /// Directions and values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
+    /// [`products`](Self::products) has it. `pairs` are the contacts by number, those of `geometry`.
+    ///
+    /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
+    /// those of its own stretch or of one before.
+    pub(crate) fn refresh(
+        &mut self,
+        geometry: &mut Geometry,
+        at: At<'_>,
+        pairs: &[[u32; 2]],
+        halves: &mut Vec<[f64; 2]>,
+    ) {
+        halves.resize(self.len(), [0.0; 2]);
+        let stretches = core::mem::take(&mut self.stretches);
         wide(
             #[inline(always)]
-            || self.refresh_here(packing, geometry, line_tension),
+            || {
+                let sorted = stretches.last().map_or(0, |stretch| stretch[1]);
+                geometry.refresh(at.packing, pairs, sorted..pairs.len());
+                let [mut run, mut contact] = [0; 2];
+                for &[runs, contacts] in &stretches {
+                    geometry.refresh(at.packing, pairs, contact..contacts);
+                    self.fill(at, geometry, run..runs, halves);
+                    [run, contact] = [runs, contacts];
+                }
+                self.fill(at, geometry, run..self.runs.len(), halves);
+            },
         );
+        self.stretches = stretches;
+        self.stale = false;
     }
 
+    /// The values of some runs, scaled and not, and their products with the forces.
     #[inline(always)]
-    fn refresh_here(&mut self, packing: &Packing, geometry: &Geometry, line_tension: f64) {
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
-        for run in &self.runs {
+    fn fill(
+        &mut self,
+        at: At<'_>,
+        geometry: &Geometry,
+        runs: Range<usize>,
+        halves: &mut [[f64; 2]],
+    ) {
+        for run in &self.runs[runs] {
             let particles = &self.particle[run.block..run.block + run.count];
-            let values = &mut self.value[run.values()];
-            let blocks = particles.iter().map(|&p| {
-                let p = p as usize;
-                (-packing.radii()[p] * per_radius, geometry.toward(p))
-            });
+            let radii = at.packing.radii();
+            let blocks = Blocks {
+                geometry,
+                ends: &self.end[run.ends()],
+                values: &mut self.value[run.values()],
+                scaled: &mut self.scaled[run.values()],
+                scaling: &self.scaling,
+                forces: at.forces,
+                halves,
+            };
+            let scales = particles.iter();
+            let scales = scales.map(|p| -radii[*p as usize] * at.per_radius);
             match run.size {
-                1 => {}
-                2 => fill::<2, 1>(blocks, values),
-                3 => fill::<3, 3>(blocks, values),
-                4 => fill::<4, 6>(blocks, values),
-                5 => fill::<5, 10>(blocks, values),
-                6 => fill::<6, 15>(blocks, values),
-                7 => fill::<7, 21>(blocks, values),
-                z => {
-                    let values = values.chunks_exact_mut(pairs_of(z));
-                    for ((scale, toward), values) in blocks.zip(values) {
-                        fill_block(scale, toward, values);
-                    }
-                }
+                1 => alone(blocks.ends, blocks.halves),
+                2 => fill::<2, 1>(blocks, scales),
+                3 => fill::<3, 3>(blocks, scales),
+                4 => fill::<4, 6>(blocks, scales),
+                5 => fill::<5, 10>(blocks, scales),
+                6 => fill::<6, 15>(blocks, scales),
+                7 => fill::<7, 21>(blocks, scales),
+                z => fill_blocks(z, blocks, scales),
             }
         }
     }
@@ -466,6 +526,8 @@ impl ContactMatrix {
                 *value = self.value[values.start + pairs_of(kept[b]) + kept[a]];
             }
         }
+        some.stale = true;
+        some.rescale();
         some
     }
 
@@ -532,27 +594,37 @@ impl ContactMatrix {
         }
     }
 
-    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. Those of
-    /// contacts at rest are 0.
-    #[inline(always)]
-    pub(crate) fn scale_off_diagonal(&self, scaled: &mut Vec<f32>) {
-        scaled.resize(self.value.len(), 0.0);
-        let by = &self.scaling[..];
+    /// Brings the scaled values up to date.
+    pub(crate) fn rescale(&mut self) {
+        if !core::mem::take(&mut self.stale) {
+            return;
+        }
         for run in &self.runs {
-            let (e, v) = (&self.end[run.ends()], &self.value[run.values()]);
-            let s = &mut scaled[run.values()];
-            match run.size {
-                1 => {}
-                2 => scale::<2, 1>(e, v, by, s),
-                3 => scale::<3, 3>(e, v, by, s),
-                4 => scale::<4, 6>(e, v, by, s),
-                5 => scale::<5, 10>(e, v, by, s),
-                6 => scale::<6, 15>(e, v, by, s),
-                7 => scale::<7, 21>(e, v, by, s),
-                z => scale_blocks(z, e, v, by, s),
+            let ends = self.end[run.ends()].chunks_exact(run.size);
+            let values = self.value[run.values()].iter();
+            let couples = (1..run.size).flat_map(|b| (0..b).map(move |a| (a, b)));
+            let couples = ends.flat_map(|ends| couples.clone().map(|(a, b)| [ends[a], ends[b]]));
+            let scaled = self.scaled[run.values()].iter_mut();
+            for ((scaled, value), couple) in scaled.zip(values).zip(couples) {
+                let [a, b] = couple.map(|e| self.scaling[(e >> 1) as usize]);
+                *scaled = (value * (a * b)) as f32;
             }
         }
     }
+
+    /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision and in the places of the others.
+    pub(crate) fn scaled(&self) -> &[f32] {
+        &self.scaled
+    }
+}
+
+/// What the values are computed at.
+#[derive(Clone, Copy)]
+pub(crate) struct At<'a> {
+    pub(crate) packing: &'a Packing,
+    pub(crate) forces: &'a [f64],
+    /// `1/2πγ`.
+    pub(crate) per_radius: f64,
 }
 
 /// `A_cc^(−½)`.
@@ -566,31 +638,4 @@ fn ends(duplicate: &DuplicateContactList, p: u32) -> impl Iterator<Item = u32> {
     let partners = duplicate.partners(p as usize).iter();
     let numbers = duplicate.contacts(p as usize).iter();
     partners.zip(numbers).map(move |(q, c)| 2 * c + u32::from(*q < p))
-}
-
-/// The entries of blocks of `Z` contacts, `T = Z (Z − 1)/2` each.
-#[inline(always)]
-fn fill<'a, const Z: usize, const T: usize>(
-    blocks: impl Iterator<Item = (f64, &'a [Direction])>,
-    values: &mut [f64],
-) {
-    for ((scale, toward), values) in blocks.zip(values.as_chunks_mut::<T>().0) {
-        if let Some(toward) = toward.first_chunk::<Z>() {
-            for b in 1..Z {
-                for a in 0..b {
-                    values[b * (b - 1) / 2 + a] = scale * toward[a].g_between(toward[b]);
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn fill_block(scale: f64, toward: &[Direction], values: &mut [f64]) {
-    let mut values = values.iter_mut();
-    for b in 1..toward.len() {
-        for (a, value) in toward[..b].iter().zip(&mut values) {
-            *value = scale * a.g_between(toward[b]);
-        }
-    }
 }

@@ -23,6 +23,7 @@
 mod bulges;
 pub mod complementarity;
 mod error;
+mod fill;
 mod geometry;
 mod images;
 mod law;

@@ -114,10 +114,8 @@ impl Patch {
         whole: Whole<'a>,
         p: u32,
     ) -> impl Iterator<Item = (usize, Direction)> + 'a {
-        let (list, toward) = (whole.geometry.duplicate(), whole.geometry.toward(p as usize));
-        let partners = list.partners(p as usize).iter();
-        let numbered = partners.zip(list.contacts(p as usize)).zip(toward);
-        let mut numbered = numbered.map(|((q, c), d)| (*q, *c as usize, *d)).peekable();
+        let numbered = whole.geometry.around(p as usize);
+        let mut numbered = numbered.map(|(q, c, d)| (q, c as usize, d)).peekable();
         let n = whole.pairs.len();
         let added = self.added_of(p).map(move |(k, toward)| {
             let [i, j] = self.added[k].pair;
@@ -141,9 +139,8 @@ impl Patch {
             let mut of = self.added_of(p);
             return of.find(|(k, _)| n + k == contact).map(|(_, toward)| toward);
         }
-        let numbers = whole.geometry.duplicate().contacts(p as usize);
-        let at = numbers.iter().position(|&c| c as usize == contact)?;
-        Some(whole.geometry.toward(p as usize)[at])
+        let mut around = whole.geometry.around(p as usize);
+        around.find(|a| a.1 as usize == contact).map(|a| a.2)
     }
 
     /// Empties the patch; what was exchanged stays.

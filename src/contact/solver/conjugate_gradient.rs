@@ -62,7 +62,7 @@ impl ConjugateGradient {
         tolerance: f64,
         loosely: bool,
     ) -> Result<usize, SolverError> {
-        match self.begin(matrix, overlaps, forces, tolerance, loosely)? {
+        match self.begin(matrix, overlaps, forces, (tolerance, loosely), None)? {
             Progress::Done(iterations) => Ok(iterations),
             Progress::NeedsWhole(iterations) => {
                 self.finish(matrix, overlaps, forces, tolerance, iterations)
@@ -72,29 +72,32 @@ impl ConjugateGradient {
 
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
     /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
-    /// above round-off: that saves a product with the matrix.
+    /// above round-off: that saves a product with the matrix. So do `halves`, the products of its off-diagonal entries with the
+    /// `forces`, where they are at hand.
     pub(crate) fn begin(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
-        tolerance: f64,
-        loosely: bool,
+        (tolerance, loosely): (f64, bool),
+        mut halves: Option<&[[f64; 2]]>,
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
+        self.single.prepare(matrix.len());
         let mut iterations = 0;
         loop {
             let before = self.largest;
-            self.largest = self.true_residual(matrix, overlaps, forces);
+            self.largest = match halves.take() {
+                Some(halves) => self.residual_of(matrix, (overlaps, forces, halves)),
+                None => self.true_residual(matrix, overlaps, forces),
+            };
             if self.largest <= tolerance {
                 return Ok(Progress::Done(iterations));
             }
             if !self.largest.is_finite() {
                 return Err(self.not_converged(tolerance, iterations));
             }
-            if iterations == 0 {
-                self.single.take(matrix);
-            } else if self.largest > 0.5 * before {
+            if iterations > 0 && self.largest > 0.5 * before {
                 return Ok(Progress::NeedsWhole(iterations));
             }
             let residual = &self.residual;
@@ -163,6 +166,18 @@ impl ConjugateGradient {
                 let columns = (overlaps, forces, &self.halves[..]);
                 subtract(&mut self.residual, matrix, columns)
             },
+        )
+    }
+
+    /// [`true_residual`](Self::true_residual) with the products of the off-diagonal entries given.
+    fn residual_of(
+        &mut self,
+        matrix: &ContactMatrix,
+        columns: (&[f64], &[f64], &[[f64; 2]]),
+    ) -> f64 {
+        wide(
+            #[inline(always)]
+            || subtract(&mut self.residual, matrix, columns),
         )
     }
 

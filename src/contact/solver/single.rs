@@ -41,10 +41,9 @@ const ROW: f32 = 64.0;
 const STRETCH: usize = 256 * CHAINS;
 const CHAINS: usize = 16;
 
-/// The matrix and the vectors.
+/// The vectors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Single {
-    value: Vec<f32>,
     residual: Vec<f32>,
     direction: Vec<f32>,
     image: Vec<f32>,
@@ -53,21 +52,17 @@ pub(super) struct Single {
 }
 
 impl Single {
-    /// Takes over the matrix.
-    pub(super) fn take(&mut self, matrix: &ContactMatrix) {
-        wide(
-            #[inline(always)]
-            || matrix.scale_off_diagonal(&mut self.value),
-        );
+    /// Room for the contacts of a matrix.
+    pub(super) fn prepare(&mut self, contacts: usize) {
         for v in [
             &mut self.residual,
             &mut self.direction,
             &mut self.image,
             &mut self.correction,
         ] {
-            v.resize(matrix.len(), 0.0);
+            v.resize(contacts, 0.0);
         }
-        self.halves.resize(matrix.len(), [0.0; 2]);
+        self.halves.resize(contacts, [0.0; 2]);
     }
 
     /// Corrects `forces`, which leave `residual` (length), so that it falls to `goal`, or as far as a round goes. Returns
@@ -117,7 +112,7 @@ impl Single {
                 *p = r + beta * *p;
             }
             most_p = most_r + beta.abs() * most_p;
-            matrix.products(&self.value, &self.direction, &mut self.halves);
+            matrix.products(matrix.scaled(), &self.direction, &mut self.halves);
             let (curvature, most_q) =
                 collect(&mut self.image, &self.direction, &self.halves, most_p)?;
             if curvature <= 0.0 {

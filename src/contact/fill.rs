@@ -1,0 +1,80 @@
+//! The loops that compute the blocks of [`ContactMatrix`](super::matrix::ContactMatrix), one for each size.
+//!
+//! Whatever a block is needed for at new positions is done while its entries are at hand: its values, the same in single
+//! precision and without units, and the products with the forces, in the order of [`product`](super::product).
+
+use super::geometry::Geometry;
+use super::product::product_of_blocks;
+
+/// Blocks of one size, and what they are computed from.
+pub(super) struct Blocks<'a> {
+    pub(super) geometry: &'a Geometry,
+    pub(super) ends: &'a [u32],
+    pub(super) values: &'a mut [f64],
+    pub(super) scaled: &'a mut [f32],
+    /// `A_cc^(−½)` of all contacts, and their forces.
+    pub(super) scaling: &'a [f64],
+    pub(super) forces: &'a [f64],
+    pub(super) halves: &'a mut [[f64; 2]],
+}
+
+/// Blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each, `scales` times `g`.
+#[inline(always)]
+pub(super) fn fill<const Z: usize, const T: usize>(
+    blocks: Blocks<'_>,
+    scales: impl Iterator<Item = f64>,
+) {
+    let Blocks {
+        geometry,
+        ends,
+        values,
+        scaled,
+        scaling,
+        forces,
+        halves,
+    } = blocks;
+    let values = values.as_chunks_mut::<T>().0.iter_mut();
+    let values = values.zip(scaled.as_chunks_mut::<T>().0);
+    let (scaling, forces) = (&scaling[..halves.len()], &forces[..halves.len()]);
+    for ((&ends, scale), (values, scaled)) in ends.as_chunks::<Z>().0.iter().zip(scales).zip(values)
+    {
+        let toward = ends.map(|e| geometry.toward(e));
+        let by = ends.map(|e| scaling[(e >> 1) as usize]);
+        let at = ends.map(|e| forces[(e >> 1) as usize]);
+        let mut sum = [0.0; Z];
+        for b in 1..Z {
+            for a in 0..b {
+                let k = b * (b - 1) / 2 + a;
+                let entry = scale * toward[a].g_between(toward[b]);
+                values[k] = entry;
+                scaled[k] = (entry * (by[a] * by[b])) as f32;
+                sum[a] += entry * at[b];
+                sum[b] += entry * at[a];
+            }
+        }
+        for (e, sum) in ends.into_iter().zip(sum) {
+            halves[(e >> 1) as usize][(e & 1) as usize] = sum;
+        }
+    }
+}
+
+/// [`fill`] of blocks of any size.
+#[inline(always)]
+pub(super) fn fill_blocks(size: usize, blocks: Blocks<'_>, scales: impl Iterator<Item = f64>) {
+    let pairs = size * (size - 1) / 2;
+    let values = blocks.values.chunks_exact_mut(pairs);
+    let values = values.zip(blocks.scaled.chunks_exact_mut(pairs));
+    let ends = blocks.ends.chunks_exact(size);
+    for ((ends, scale), (values, scaled)) in ends.zip(scales).zip(values) {
+        let mut columns = values.iter_mut().zip(scaled);
+        for (b, &eb) in ends.iter().enumerate() {
+            let toward = blocks.geometry.toward(eb);
+            let by = blocks.scaling[(eb >> 1) as usize];
+            for (&ea, (value, scaled)) in ends[..b].iter().zip(&mut columns) {
+                *value = scale * blocks.geometry.toward(ea).g_between(toward);
+                *scaled = (*value * (blocks.scaling[(ea >> 1) as usize] * by)) as f32;
+            }
+        }
+        product_of_blocks(size, ends, values, blocks.forces, blocks.halves);
+    }
+}
