@@ -4,11 +4,13 @@
 //! precision and without units, and the products with the forces, in the order of [`product`](super::product).
 
 use super::geometry::Geometry;
+use crate::droplet::kernel::Direction;
 use super::product::product_of_blocks;
 
 /// Blocks of one size, and what they are computed from.
 pub(super) struct Blocks<'a> {
     pub(super) geometry: &'a Geometry,
+    pub(super) toward: &'a [Direction],
     pub(super) ends: &'a [u32],
     pub(super) values: &'a mut [f64],
     pub(super) scaled: &'a mut [f32],
@@ -25,29 +27,41 @@ pub(super) fn fill<const Z: usize, const T: usize>(
     scales: impl Iterator<Item = f64>,
 ) {
     let Blocks {
-        geometry,
+        toward,
         ends,
         values,
         scaled,
         scaling,
         forces,
         halves,
+        ..
     } = blocks;
-    let values = values.as_chunks_mut::<T>().0.iter_mut();
-    let values = values.zip(scaled.as_chunks_mut::<T>().0);
+    let (values, scaled) = (values.as_chunks_mut::<T>().0, scaled.as_chunks_mut::<T>().0);
+    let ends = ends.as_chunks::<Z>().0;
     let (scaling, forces) = (&scaling[..halves.len()], &forces[..halves.len()]);
-    for ((&ends, scale), (values, scaled)) in ends.as_chunks::<Z>().0.iter().zip(scales).zip(values)
-    {
-        let toward = ends.map(|e| geometry.toward(e));
+    let blocks = values.iter_mut().zip(scales).zip(toward.as_chunks::<Z>().0);
+    for ((values, scale), toward) in blocks {
+        for b in 1..Z {
+            for a in 0..b {
+                values[b * (b - 1) / 2 + a] = scale * toward[a].g_between(toward[b]);
+            }
+        }
+    }
+    for ((&ends, values), scaled) in ends.iter().zip(&*values).zip(scaled) {
         let by = ends.map(|e| scaling[(e >> 1) as usize]);
+        for b in 1..Z {
+            for a in 0..b {
+                let k = b * (b - 1) / 2 + a;
+                scaled[k] = (values[k] * (by[a] * by[b])) as f32;
+            }
+        }
+    }
+    for (&ends, values) in ends.iter().zip(&*values) {
         let at = ends.map(|e| forces[(e >> 1) as usize]);
         let mut sum = [0.0; Z];
         for b in 1..Z {
             for a in 0..b {
-                let k = b * (b - 1) / 2 + a;
-                let entry = scale * toward[a].g_between(toward[b]);
-                values[k] = entry;
-                scaled[k] = (entry * (by[a] * by[b])) as f32;
+                let entry = values[b * (b - 1) / 2 + a];
                 sum[a] += entry * at[b];
                 sum[b] += entry * at[a];
             }

@@ -391,11 +391,15 @@ impl ContactMatrix {
         runs: Range<usize>,
         halves: &mut [[f64; 2]],
     ) {
+        let mut toward = Vec::new();
         for run in &self.runs[runs] {
+            toward.clear();
+            toward.extend(self.end[run.ends()].iter().map(|e| geometry.toward(*e)));
             let particles = &self.particle[run.block..run.block + run.count];
             let radii = at.packing.radii();
             let blocks = Blocks {
                 geometry,
+                toward: &toward,
                 ends: &self.end[run.ends()],
                 values: &mut self.value[run.values()],
                 scaled: &mut self.scaled[run.values()],
