@@ -8,7 +8,7 @@ use crate::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::wide::wide;
 
 /// What a force is counted with to spare, in units of the mean force.
-const SPARE: f64 = 0.1;
+const SPARE: f64 = 0.05;
 
 /// Steps that the bounds grow before they are summed anew.
 const LONGEST: u32 = 50;

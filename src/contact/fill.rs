@@ -1,15 +1,14 @@
 //! The loops that compute the blocks of [`ContactMatrix`](super::matrix::ContactMatrix), one for each size.
 //!
-//! Whatever a block is needed for at new positions is done while its entries are at hand: its values, the same in single
-//! precision and without units, and the products with the forces, in the order of [`product`](super::product).
+//! Whatever a run of blocks is needed for at new positions is done while its entries are near: its values, the same in single
+//! precision and without units, and the products with the forces. One simple loop each: a single loop for all is slower.
 
-use super::geometry::Geometry;
+use super::product::{product, product_of_blocks};
 use crate::droplet::kernel::Direction;
-use super::product::product_of_blocks;
 
 /// Blocks of one size, and what they are computed from.
 pub(super) struct Blocks<'a> {
-    pub(super) geometry: &'a Geometry,
+    /// The directions of the ends.
     pub(super) toward: &'a [Direction],
     pub(super) ends: &'a [u32],
     pub(super) values: &'a mut [f64],
@@ -34,11 +33,9 @@ pub(super) fn fill<const Z: usize, const T: usize>(
         scaling,
         forces,
         halves,
-        ..
     } = blocks;
     let (values, scaled) = (values.as_chunks_mut::<T>().0, scaled.as_chunks_mut::<T>().0);
     let ends = ends.as_chunks::<Z>().0;
-    let (scaling, forces) = (&scaling[..halves.len()], &forces[..halves.len()]);
     let blocks = values.iter_mut().zip(scales).zip(toward.as_chunks::<Z>().0);
     for ((values, scale), toward) in blocks {
         for b in 1..Z {
@@ -56,20 +53,7 @@ pub(super) fn fill<const Z: usize, const T: usize>(
             }
         }
     }
-    for (&ends, values) in ends.iter().zip(&*values) {
-        let at = ends.map(|e| forces[(e >> 1) as usize]);
-        let mut sum = [0.0; Z];
-        for b in 1..Z {
-            for a in 0..b {
-                let entry = values[b * (b - 1) / 2 + a];
-                sum[a] += entry * at[b];
-                sum[b] += entry * at[a];
-            }
-        }
-        for (e, sum) in ends.into_iter().zip(sum) {
-            halves[(e >> 1) as usize][(e & 1) as usize] = sum;
-        }
-    }
+    product::<f64, Z, T>(ends.as_flattened(), values.as_flattened(), forces, halves);
 }
 
 /// [`fill`] of blocks of any size.
@@ -79,14 +63,14 @@ pub(super) fn fill_blocks(size: usize, blocks: Blocks<'_>, scales: impl Iterator
     let values = blocks.values.chunks_exact_mut(pairs);
     let values = values.zip(blocks.scaled.chunks_exact_mut(pairs));
     let ends = blocks.ends.chunks_exact(size);
-    for ((ends, scale), (values, scaled)) in ends.zip(scales).zip(values) {
+    let ends = ends.zip(blocks.toward.chunks_exact(size));
+    for (((ends, toward), scale), (values, scaled)) in ends.zip(scales).zip(values) {
+        let by = |e: u32| blocks.scaling[(e >> 1) as usize];
         let mut columns = values.iter_mut().zip(scaled);
-        for (b, &eb) in ends.iter().enumerate() {
-            let toward = blocks.geometry.toward(eb);
-            let by = blocks.scaling[(eb >> 1) as usize];
-            for (&ea, (value, scaled)) in ends[..b].iter().zip(&mut columns) {
-                *value = scale * blocks.geometry.toward(ea).g_between(toward);
-                *scaled = (*value * (blocks.scaling[(ea >> 1) as usize] * by)) as f32;
+        for b in 1..size {
+            for (a, (value, scaled)) in (0..b).zip(&mut columns) {
+                *value = scale * toward[a].g_between(toward[b]);
+                *scaled = (*value * (by(ends[a]) * by(ends[b]))) as f32;
             }
         }
         product_of_blocks(size, ends, values, blocks.forces, blocks.halves);

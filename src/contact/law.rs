@@ -284,18 +284,10 @@ impl ContactLaw {
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<(), ContactError> {
-        let matrix = if self.is_in_order() {
-            &self.matrix
-        } else {
-            let numbered = Contacts {
-                pairs: &self.pairs,
-                normals: self.geometry.normals(),
-                distances: self.geometry.distances(),
-                overlaps: self.geometry.overlaps(),
-                forces: &self.forces,
-            };
-            let present = self.present.get_or_init(|| Present::of(&numbered, &self.matrix));
-            present.matrix(&self.matrix)
+        self.present();
+        let matrix = match self.present.get() {
+            Some(present) if !self.is_in_order() => present.matrix(&self.matrix),
+            _ => &self.matrix,
         };
         self.solver.solve(matrix, b, x, tolerance)?;
         Ok(())

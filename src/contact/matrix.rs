@@ -5,7 +5,7 @@ pub use super::geometry::Geometry;
 use super::list::{ContactList, DuplicateContactList};
 use super::fill::{Blocks, fill, fill_blocks};
 use super::product::{Number, alone, product, product_of_blocks};
-use crate::droplet::kernel::G_AT_CONTACT;
+use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
 use crate::wide::wide;
 use core::f64::consts::PI;
@@ -63,6 +63,8 @@ pub struct ContactMatrix {
     scaled: Vec<f32>,
     /// Whether `scaled` is of contacts that have come to rest or woken since.
     stale: bool,
+    /// Room for the directions of a run.
+    toward: Vec<Direction>,
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
     stretches: Vec<[usize; 2]>,
     /// The block of each particle, [`NO_BLOCK`] where it has no contact.
@@ -304,6 +306,11 @@ impl ContactMatrix {
         !self.changed
     }
 
+    /// The contacts that the structure was built of come first, this many, in the order of pairs.
+    pub(crate) fn sorted_contacts(&self) -> usize {
+        self.stretches.last().map_or(0, |stretch| stretch[1])
+    }
+
     /// Number of particles.
     pub(crate) fn particles(&self) -> usize {
         self.block_of.len()
@@ -363,11 +370,11 @@ impl ContactMatrix {
         halves: &mut Vec<[f64; 2]>,
     ) {
         halves.resize(self.len(), [0.0; 2]);
+        let sorted = self.sorted_contacts();
         let stretches = core::mem::take(&mut self.stretches);
         wide(
             #[inline(always)]
             || {
-                let sorted = stretches.last().map_or(0, |stretch| stretch[1]);
                 geometry.refresh(at.packing, pairs, sorted..pairs.len());
                 let [mut run, mut contact] = [0; 2];
                 for &[runs, contacts] in &stretches {
@@ -391,16 +398,15 @@ impl ContactMatrix {
         runs: Range<usize>,
         halves: &mut [[f64; 2]],
     ) {
-        let mut toward = Vec::new();
+        let radii = at.packing.radii();
         for run in &self.runs[runs] {
-            toward.clear();
-            toward.extend(self.end[run.ends()].iter().map(|e| geometry.toward(*e)));
+            let ends = &self.end[run.ends()];
+            self.toward.clear();
+            self.toward.extend(ends.iter().map(|e| geometry.toward(*e)));
             let particles = &self.particle[run.block..run.block + run.count];
-            let radii = at.packing.radii();
             let blocks = Blocks {
-                geometry,
-                toward: &toward,
-                ends: &self.end[run.ends()],
+                toward: &self.toward,
+                ends,
                 values: &mut self.value[run.values()],
                 scaled: &mut self.scaled[run.values()],
                 scaling: &self.scaling,

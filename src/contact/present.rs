@@ -60,12 +60,18 @@ impl Present {
 
 /// The numbers of the contacts that are not at rest, in the order of pairs.
 pub(super) fn in_order(pairs: &[[u32; 2]], matrix: &ContactMatrix) -> Vec<u32> {
-    let numbers = (0..).zip(pairs).zip(matrix.scaling());
-    let mut order: Vec<u32> = numbers
-        .filter(|(_, scaling)| **scaling > 0.0)
-        .map(|((c, _), _)| c)
-        .collect();
-    // Nearly all ascend already.
-    order.sort_by_key(|c| pairs[*c as usize]);
+    let at_work = |c: &u32| matrix.scaling()[*c as usize] > 0.0;
+    let (sorted, all) = (matrix.sorted_contacts() as u32, pairs.len() as u32);
+    let mut late: Vec<u32> = (sorted..all).filter(at_work).collect();
+    late.sort_unstable_by_key(|c| pairs[*c as usize]);
+    let mut late = late.into_iter().peekable();
+    let mut order = Vec::with_capacity(pairs.len());
+    for c in (0..sorted).filter(at_work) {
+        while let Some(k) = late.next_if(|k| pairs[*k as usize] < pairs[c as usize]) {
+            order.push(k);
+        }
+        order.push(c);
+    }
+    order.extend(late);
     order
 }

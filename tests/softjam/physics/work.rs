@@ -36,31 +36,33 @@ fn walk(scene: &Scene, mut seen: impl FnMut(&Relaxation, Work, bool)) -> Relaxat
 }
 
 #[test]
-fn structure_is_built_only_when_the_contacts_change() {
-    let (mut steady, mut tightened) = (0u64, 0);
+fn contacts_come_and_go_without_a_new_structure() {
+    let (mut exchanges, mut tightened) = (0u64, 0);
     let run = walk(&scene(256, 0.86, 2), |_, work, same| {
         assert_eq!(work.solves, 1);
-        if work.structures == 0 {
-            assert!(same, "other contacts, but no other structure");
-            assert_eq!(work.assemblies, 1, "positions are taken over once a step");
-            steady += 1;
-            tightened += u64::from(work.sweeps > 1);
-        } else {
-            assert_eq!(work.assemblies, 1, "an exchange takes over what stays");
+        assert!(
+            (1..=1 + work.structures).contains(&work.assemblies),
+            "positions are taken over once a step, and again for a structure that is built at them"
+        );
+        if !same {
+            exchanges += 1;
             assert!(
                 work.sweeps + work.patches >= 2,
                 "an exchange is followed by a solution"
             );
         }
+        tightened += u64::from(same && work.sweeps > 1);
     });
+    let structures = run.law().work().structures;
     println!(
-        "{steady} of {} steps without, {tightened} solved on",
+        "{structures} structures for {exchanges} exchanges in {} steps, {tightened} solved on",
         run.step()
     );
-    assert!(steady as f64 > 0.75 * run.step() as f64);
-    // The first set is found from nothing; afterwards one structure an exchange.
-    let work = run.law().work();
-    assert!(work.structures <= 1 + work.sweeps + work.patches - work.solves);
+    assert!(exchanges > 50, "contacts do come and go");
+    assert!(
+        10 * structures < exchanges,
+        "{structures} structures for {exchanges} exchanges"
+    );
 }
 
 #[test]
@@ -125,12 +127,13 @@ fn frames_keep_the_residual_that_they_promise_and_the_last_the_full_tolerance() 
     }
 }
 
-/// The pairs whose bulges could bridge the distance between them, by the bound `R (0.640 76 Σ f)/2π` of each bulge.
-fn pairs_in_reach(packing: &Packing, law: &ContactLaw) -> u64 {
+/// The pairs whose bulges could bridge the distance between them, by `factor` times the bound `R (0.640 76 Σ f)/2π` of each
+/// bulge.
+fn pairs_in_reach(packing: &Packing, law: &ContactLaw, factor: f64) -> u64 {
     let mut reach = packing.radii().to_vec();
     for (&[i, j], f) in law.contacts().pairs.iter().zip(law.contacts().forces) {
         for p in [i as usize, j as usize] {
-            reach[p] += packing.radii()[p] * 0.640_76 * f / (2.0 * PI);
+            reach[p] += factor * packing.radii()[p] * 0.640_76 * f / (2.0 * PI);
         }
     }
     let n = packing.len();
@@ -150,9 +153,12 @@ fn gaps_are_computed_of_pairs_that_could_touch_and_of_no_other() {
         assert_eq!(work.sweeps - before.sweeps, 1);
         assert_eq!(work.iterations, before.iterations, "the answer is known");
         let contacts = law.contacts().pairs.len() as u64;
-        assert_eq!(
-            work.gaps - before.gaps + contacts,
-            pairs_in_reach(run.packing(), &law)
+        // The bounds that are kept are wider than they would have to be, by no more than the forces grew since.
+        let looked_at = work.gaps - before.gaps + contacts;
+        let [least, most] = [1.0, 1.3].map(|k| pairs_in_reach(run.packing(), &law, k));
+        assert!(
+            (least..=most).contains(&looked_at),
+            "{looked_at} pairs, {least} to {most} in reach"
         );
         // Distances only of what the neighbour list holds besides: about one a particle.
         let distances = (work.distances - before.distances) as f64 / 256.0;
