@@ -45,7 +45,10 @@ pub(super) fn fill<const Z: usize, const T: usize>(
         }
     }
     for ((&ends, values), scaled) in ends.iter().zip(&*values).zip(scaled) {
-        let by = ends.map(|e| scaling[(e >> 1) as usize]);
+        let mut by = [0.0; Z];
+        for (by, e) in by.iter_mut().zip(ends) {
+            *by = scaling[(e >> 1) as usize];
+        }
         for b in 1..Z {
             for a in 0..b {
                 let k = b * (b - 1) / 2 + a;

@@ -5,6 +5,7 @@ pub use super::geometry::Geometry;
 use super::list::{ContactList, DuplicateContactList};
 use super::fill::{Blocks, fill, fill_blocks};
 use super::product::{Number, alone, product, product_of_blocks};
+use crate::domain::Vec2;
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
 use crate::wide::wide;
@@ -401,8 +402,13 @@ impl ContactMatrix {
         let radii = at.packing.radii();
         for run in &self.runs[runs] {
             let ends = &self.end[run.ends()];
-            self.toward.clear();
-            self.toward.extend(ends.iter().map(|e| geometry.toward(*e)));
+            // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
+            if self.toward.len() < ends.len() {
+                self.toward.resize(ends.len(), Direction::of(Vec2::x()));
+            }
+            for (toward, end) in self.toward.iter_mut().zip(ends) {
+                *toward = geometry.toward(*end);
+            }
             let particles = &self.particle[run.block..run.block + run.count];
             let blocks = Blocks {
                 toward: &self.toward,
