@@ -119,7 +119,7 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// Solves `A f = δ` of the present set; returns the iterations. `multiplied` says that `halves` are of the present forces.
+    /// Solves `A f = δ` of the present set; returns the iterations. `multiplied` says that `products` are of the present forces.
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
@@ -130,8 +130,8 @@ impl ContactLaw {
             return self.solver.solve(matrix, overlaps, forces, tolerance);
         };
         let goal = (tolerance, tolerance > FAR_ABOVE_ROUND_OFF * scale);
-        let halves = multiplied.then_some(&self.halves[..]);
-        let iterations = match solver.begin(matrix, overlaps, forces, goal, halves)? {
+        let products = multiplied.then_some(&self.products[..]);
+        let iterations = match solver.begin(matrix, overlaps, forces, goal, products)? {
             Progress::Done(iterations) => return Ok(iterations),
             Progress::NeedsWhole(iterations) => iterations,
         };
@@ -145,7 +145,7 @@ impl ContactLaw {
     }
 
     /// Geometry and matrix of the present set at the present positions; what still stands is not done again. Says whether it was
-    /// not, and `halves` are the products of `A` with the present forces.
+    /// not, and `products` are those of the off-diagonal entries of `A` with the present forces.
     pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
         if !self.refreshed && self.is_untidy() {
             self.put_in_order(&[]);
@@ -166,7 +166,7 @@ impl ContactLaw {
                 per_radius: 1.0 / (2.0 * PI * self.line_tension),
             };
             self.matrix
-                .refresh(&mut self.geometry, at, &self.pairs, &mut self.halves);
+                .refresh(&mut self.geometry, at, &self.pairs, &mut self.products);
             self.work.assemblies += 1;
             (self.structured, self.refreshed) = (true, true);
         }
@@ -226,8 +226,7 @@ impl ContactLaw {
     /// `max |A f − δ|` of the present forces.
     pub(super) fn measure_equation(&mut self) {
         self.image.resize(self.forces.len(), 0.0);
-        self.matrix
-            .multiply_with(&self.forces, &mut self.image, &mut self.halves);
+        self.matrix.multiply(&self.forces, &mut self.image);
         self.off = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
         for ((q, d), s) in rows.zip(self.matrix.scaling()) {

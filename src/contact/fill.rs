@@ -16,7 +16,8 @@ pub(super) struct Blocks<'a> {
     /// `A_cc^(−½)` of all contacts, and their forces.
     pub(super) scaling: &'a [f64],
     pub(super) forces: &'a [f64],
-    pub(super) halves: &'a mut [[f64; 2]],
+    /// What the entries make of the forces is added to these.
+    pub(super) products: &'a mut [f64],
 }
 
 /// Blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each, `scales` times `g`.
@@ -32,7 +33,7 @@ pub(super) fn fill<const Z: usize, const T: usize>(
         scaled,
         scaling,
         forces,
-        halves,
+        products,
     } = blocks;
     let (values, scaled) = (values.as_chunks_mut::<T>().0, scaled.as_chunks_mut::<T>().0);
     let ends = ends.as_chunks::<Z>().0;
@@ -56,7 +57,7 @@ pub(super) fn fill<const Z: usize, const T: usize>(
             }
         }
     }
-    product::<f64, Z, T>(ends.as_flattened(), values.as_flattened(), forces, halves);
+    product::<f64, Z, T>(ends.as_flattened(), values.as_flattened(), forces, products);
 }
 
 /// [`fill`] of blocks of any size.
@@ -76,6 +77,6 @@ pub(super) fn fill_blocks(size: usize, blocks: Blocks<'_>, scales: impl Iterator
                 *scaled = (*value * (by(ends[a]) * by(ends[b]))) as f32;
             }
         }
-        product_of_blocks(size, ends, values, blocks.forces, blocks.halves);
+        product_of_blocks(size, ends, values, blocks.forces, blocks.products);
     }
 }

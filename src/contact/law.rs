@@ -85,7 +85,7 @@ pub struct ContactLaw {
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
-    pub(super) halves: Vec<[f64; 2]>,
+    pub(super) products: Vec<f64>,
     pub(super) bulges: Bulges,
     /// The largest bulge that the neighbour list is known to cover at the present positions.
     pub(super) covered: f64,
@@ -172,7 +172,7 @@ impl ContactLaw {
             parted: false,
             slack: 0.0,
             image: Vec::new(),
-            halves: Vec::new(),
+            products: Vec::new(),
             bulges: Bulges::default(),
             covered: 0.0,
             tolerated: 0.0,

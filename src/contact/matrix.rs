@@ -4,7 +4,7 @@ pub use super::geometry::Geometry;
 
 use super::list::{ContactList, DuplicateContactList};
 use super::fill::{Blocks, fill, fill_blocks};
-use super::product::{Number, alone, product, product_of_blocks};
+use super::product::{Number, product, product_of_blocks};
 use crate::domain::Vec2;
 use crate::droplet::kernel::{Direction, G_AT_CONTACT};
 use crate::packing::Packing;
@@ -156,7 +156,7 @@ impl ContactMatrix {
     ) {
         self.restructure(packing, contacts, geometry.duplicate(), line_tension);
         let forces = vec![0.0; contacts.len()];
-        let halves = &mut vec![[0.0; 2]; contacts.len()];
+        let products = &mut vec![0.0; contacts.len()];
         let at = At {
             packing,
             forces: &forces,
@@ -164,7 +164,7 @@ impl ContactMatrix {
         };
         wide(
             #[inline(always)]
-            || self.fill(at, geometry, 0..self.runs.len(), halves),
+            || self.fill(at, geometry, 0..self.runs.len(), products),
         );
     }
 
@@ -368,9 +368,10 @@ impl ContactMatrix {
         geometry: &mut Geometry,
         at: At<'_>,
         pairs: &[[u32; 2]],
-        halves: &mut Vec<[f64; 2]>,
+        products: &mut Vec<f64>,
     ) {
-        halves.resize(self.len(), [0.0; 2]);
+        products.clear();
+        products.resize(self.len(), 0.0);
         let sorted = self.sorted_contacts();
         let stretches = core::mem::take(&mut self.stretches);
         wide(
@@ -380,10 +381,10 @@ impl ContactMatrix {
                 let [mut run, mut contact] = [0; 2];
                 for &[runs, contacts] in &stretches {
                     geometry.refresh(at.packing, pairs, contact..contacts);
-                    self.fill(at, geometry, run..runs, halves);
+                    self.fill(at, geometry, run..runs, products);
                     [run, contact] = [runs, contacts];
                 }
-                self.fill(at, geometry, run..self.runs.len(), halves);
+                self.fill(at, geometry, run..self.runs.len(), products);
             },
         );
         self.stretches = stretches;
@@ -397,7 +398,7 @@ impl ContactMatrix {
         at: At<'_>,
         geometry: &Geometry,
         runs: Range<usize>,
-        halves: &mut [[f64; 2]],
+        products: &mut [f64],
     ) {
         let radii = at.packing.radii();
         for run in &self.runs[runs] {
@@ -417,12 +418,12 @@ impl ContactMatrix {
                 scaled: &mut self.scaled[run.values()],
                 scaling: &self.scaling,
                 forces: at.forces,
-                halves,
+                products,
             };
             let scales = particles.iter();
             let scales = scales.map(|p| -radii[*p as usize] * at.per_radius);
             match run.size {
-                1 => alone(blocks.ends, blocks.halves),
+                1 => {}
                 2 => fill::<2, 1>(blocks, scales),
                 3 => fill::<3, 3>(blocks, scales),
                 4 => fill::<4, 6>(blocks, scales),
@@ -558,54 +559,49 @@ impl ContactMatrix {
     /// ContactMatrix::default().multiply(&[], &mut []);
     /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        self.multiply_with(x, y, &mut Vec::new());
-    }
-
-    /// [`multiply`](Self::multiply) in the room of `halves`.
-    pub(crate) fn multiply_with(&self, x: &[f64], y: &mut [f64], halves: &mut Vec<[f64; 2]>) {
         wide(
             #[inline(always)]
-            || self.multiply_here(x, y, halves),
+            || self.multiply_here(x, y),
         );
     }
 
     /// [`multiply`](Self::multiply), to be inlined into loops that are compiled for wide vectors.
     #[inline(always)]
-    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64], halves: &mut Vec<[f64; 2]>) {
+    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64]) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);
-        self.off_diagonal_products(x, halves);
-        let rows = y.iter_mut().zip(x).zip(&self.diagonal);
-        for (((y, x), d), [lower, higher]) in rows.zip(halves) {
-            *y = (d * x + *lower) + *higher;
+        self.off_diagonal_products(x, y);
+        for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
+            *y += d * x;
         }
     }
 
     /// The [`products`](Self::products) of the off-diagonal entries of `A` itself.
     #[inline(always)]
-    pub(crate) fn off_diagonal_products(&self, x: &[f64], halves: &mut Vec<[f64; 2]>) {
-        halves.resize(self.len(), [0.0; 2]);
-        self.products(&self.value, x, halves);
+    pub(crate) fn off_diagonal_products(&self, x: &[f64], y: &mut [f64]) {
+        self.products(&self.value, x, y);
     }
 
-    /// What the off-diagonal entries of `A` make of `x`, contact by contact: what comes from the others at its lower particle
-    /// and what comes from those at the higher. `values` are those of `A`, or others in their places.
+    /// What the off-diagonal entries of `A` make of `x`, contact by contact. `values` are those of `A`, or others in their
+    /// places.
     ///
-    /// Each half is a sum in the order of the particle's partners, and the two are kept apart: whatever numbers the contacts
-    /// have and however the blocks are sorted, the bits are the same.
+    /// A contact has two ends. What comes from the others at one end is a sum in the order of the particle's partners; of the
+    /// two sums it is the same which is added to which. So whatever numbers the contacts have and however the blocks are
+    /// sorted, the bits are the same.
     #[inline(always)]
-    pub(crate) fn products<F: Number>(&self, values: &[F], x: &[F], halves: &mut [[F; 2]]) {
+    pub(crate) fn products<F: Number>(&self, values: &[F], x: &[F], y: &mut [F]) {
+        y.fill(F::default());
         for run in &self.runs {
             let (e, v) = (&self.end[run.ends()], &values[run.values()]);
             match run.size {
-                1 => alone(e, halves),
-                2 => product::<F, 2, 1>(e, v, x, halves),
-                3 => product::<F, 3, 3>(e, v, x, halves),
-                4 => product::<F, 4, 6>(e, v, x, halves),
-                5 => product::<F, 5, 10>(e, v, x, halves),
-                6 => product::<F, 6, 15>(e, v, x, halves),
-                7 => product::<F, 7, 21>(e, v, x, halves),
-                z => product_of_blocks(z, e, v, x, halves),
+                1 => {}
+                2 => product::<F, 2, 1>(e, v, x, y),
+                3 => product::<F, 3, 3>(e, v, x, y),
+                4 => product::<F, 4, 6>(e, v, x, y),
+                5 => product::<F, 5, 10>(e, v, x, y),
+                6 => product::<F, 6, 15>(e, v, x, y),
+                7 => product::<F, 7, 21>(e, v, x, y),
+                z => product_of_blocks(z, e, v, x, y),
             }
         }
     }

@@ -10,16 +10,16 @@ pub(crate) trait Number: Copy + Default + AddAssign + Mul<Output = Self> {}
 impl Number for f64 {}
 impl Number for f32 {}
 
-/// The products of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each, into the `halves` of their contacts.
+/// `y += A x` of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each.
 #[inline(always)]
 pub(super) fn product<F: Number, const Z: usize, const T: usize>(
     ends: &[u32],
     values: &[F],
     x: &[F],
-    halves: &mut [[F; 2]],
+    y: &mut [F],
 ) {
     let (ends, values) = (ends.as_chunks::<Z>().0, values.as_chunks::<T>().0);
-    let x = &x[..halves.len()];
+    let x = &x[..y.len()];
     // Ends by value, so that the number of each contact is checked once.
     for (&ends, v) in ends.iter().zip(values) {
         let mut at = [F::default(); Z];
@@ -35,17 +35,8 @@ pub(super) fn product<F: Number, const Z: usize, const T: usize>(
             }
         }
         for (e, sum) in ends.into_iter().zip(sum) {
-            halves[(e >> 1) as usize][(e & 1) as usize] = sum;
+            y[(e >> 1) as usize] += sum;
         }
-    }
-}
-
-/// [`product`] of blocks of one contact, which is coupled to no other there.
-#[inline(always)]
-pub(super) fn alone<F: Number>(ends: &[u32], halves: &mut [[F; 2]]) {
-    let halves = halves.as_flattened_mut();
-    for e in ends {
-        halves[*e as usize] = F::default();
     }
 }
 
@@ -56,16 +47,20 @@ pub(super) fn product_of_blocks<F: Number>(
     ends: &[u32],
     values: &[F],
     x: &[F],
-    halves: &mut [[F; 2]],
+    y: &mut [F],
 ) {
-    let (mut values, halves) = (values.iter(), halves.as_flattened_mut());
-    for ends in ends.chunks_exact(size) {
-        for (b, &eb) in ends.iter().enumerate() {
-            halves[eb as usize] = F::default();
-            for (&ea, &entry) in ends[..b].iter().zip(&mut values) {
-                halves[ea as usize] += entry * x[(eb >> 1) as usize];
-                halves[eb as usize] += entry * x[(ea >> 1) as usize];
+    let mut values = values.chunks_exact(size * (size - 1) / 2);
+    for (ends, values) in ends.chunks_exact(size).zip(&mut values) {
+        let entry = |a: usize, b: usize| {
+            let (a, b) = (a.min(b), a.max(b));
+            values[b * (b - 1) / 2 + a]
+        };
+        for (b, eb) in ends.iter().enumerate() {
+            let mut sum = F::default();
+            for (a, ea) in ends.iter().enumerate().filter(|(a, _)| *a != b) {
+                sum += entry(a, b) * x[(ea >> 1) as usize];
             }
+            y[(eb >> 1) as usize] += sum;
         }
     }
 }

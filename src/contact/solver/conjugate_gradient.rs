@@ -14,7 +14,6 @@ pub struct ConjugateGradient {
     residual: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    halves: Vec<[f64; 2]>,
     largest: f64,
     single: Single,
 }
@@ -72,7 +71,7 @@ impl ConjugateGradient {
 
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
     /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
-    /// above round-off: that saves a product with the matrix. So do `halves`, the products of its off-diagonal entries with the
+    /// above round-off: that saves a product with the matrix. So do `products`, those of its off-diagonal entries with the
     /// `forces`, where they are at hand.
     pub(crate) fn begin(
         &mut self,
@@ -80,15 +79,15 @@ impl ConjugateGradient {
         overlaps: &[f64],
         forces: &mut [f64],
         (tolerance, loosely): (f64, bool),
-        mut halves: Option<&[[f64; 2]]>,
+        mut products: Option<&[f64]>,
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
         self.single.prepare(matrix.len());
         let mut iterations = 0;
         loop {
             let before = self.largest;
-            self.largest = match halves.take() {
-                Some(halves) => self.residual_of(matrix, (overlaps, forces, halves)),
+            self.largest = match products.take() {
+                Some(products) => self.residual_of(matrix, (overlaps, forces, products)),
                 None => self.true_residual(matrix, overlaps, forces),
             };
             if self.largest <= tolerance {
@@ -162,8 +161,8 @@ impl ConjugateGradient {
         wide(
             #[inline(always)]
             || {
-                matrix.off_diagonal_products(forces, &mut self.halves);
-                let columns = (overlaps, forces, &self.halves[..]);
+                matrix.off_diagonal_products(forces, &mut self.image);
+                let columns = (overlaps, forces, &self.image[..]);
                 subtract(&mut self.residual, matrix, columns)
             },
         )
@@ -173,7 +172,7 @@ impl ConjugateGradient {
     fn residual_of(
         &mut self,
         matrix: &ContactMatrix,
-        columns: (&[f64], &[f64], &[[f64; 2]]),
+        columns: (&[f64], &[f64], &[f64]),
     ) -> f64 {
         wide(
             #[inline(always)]
@@ -214,7 +213,7 @@ impl ConjugateGradient {
             for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(scaling) {
                 *p = r * (s * s) + beta * *p;
             }
-            matrix.multiply_here(&self.direction, &mut self.image, &mut self.halves);
+            matrix.multiply_here(&self.direction, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
             if curvature.is_nan() || curvature <= 0.0 {
                 let contact = largest_entry(&self.direction);
@@ -243,36 +242,36 @@ impl ConjugateGradient {
     }
 }
 
-/// `r = δ − (A_cc f + the halves)`, 0 for contacts at rest; returns the largest magnitude, NaN if any is.
+/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest magnitude, NaN if any is.
 #[inline(always)]
 fn subtract(
     residual: &mut [f64],
     matrix: &ContactMatrix,
-    (overlaps, forces, halves): (&[f64], &[f64], &[[f64; 2]]),
+    (overlaps, forces, products): (&[f64], &[f64], &[f64]),
 ) -> f64 {
     let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
-    let left = |d: f64, f: f64, h: [f64; 2], a: f64, s: f64| {
-        let r = d - ((a * f + h[0]) + h[1]);
+    let left = |d: f64, f: f64, q: f64, a: f64, s: f64| {
+        let r = d - (a * f + q);
         if s > 0.0 { r } else { 0.0 }
     };
     let (r8, r_rest) = residual.as_chunks_mut::<8>();
     let (d8, d_rest) = overlaps.as_chunks::<8>();
     let (f8, f_rest) = forces.as_chunks::<8>();
-    let (h8, h_rest) = halves.as_chunks::<8>();
+    let (q8, q_rest) = products.as_chunks::<8>();
     let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
     let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
     let mut largest = [0.0; 8];
-    let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(h8));
-    for (((r, d), (f, h)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
+    let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(q8));
+    for (((r, d), (f, q)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
-            r[k] = left(d[k], f[k], h[k], a[k], s[k]);
+            r[k] = left(d[k], f[k], q[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
         }
     }
     let mut most = largest.into_iter().fold(0.0, larger);
-    let rows = r_rest.iter_mut().zip(d_rest).zip(f_rest.iter().zip(h_rest));
-    for (((r, d), (f, h)), (a, s)) in rows.zip(a_rest.iter().zip(s_rest)) {
-        *r = left(*d, *f, *h, *a, *s);
+    let rows = r_rest.iter_mut().zip(d_rest).zip(f_rest.iter().zip(q_rest));
+    for (((r, d), (f, q)), (a, s)) in rows.zip(a_rest.iter().zip(s_rest)) {
+        *r = left(*d, *f, *q, *a, *s);
         most = larger(most, r.abs());
     }
     most

@@ -47,7 +47,6 @@ pub(super) struct Single {
     residual: Vec<f32>,
     direction: Vec<f32>,
     image: Vec<f32>,
-    halves: Vec<[f32; 2]>,
     correction: Vec<f32>,
 }
 
@@ -62,7 +61,6 @@ impl Single {
         ] {
             v.resize(contacts, 0.0);
         }
-        self.halves.resize(contacts, [0.0; 2]);
     }
 
     /// Corrects `forces`, which leave `residual` (length), so that it falls to `goal`, or as far as a round goes. Returns
@@ -112,9 +110,8 @@ impl Single {
                 *p = r + beta * *p;
             }
             most_p = most_r + beta.abs() * most_p;
-            matrix.products(matrix.scaled(), &self.direction, &mut self.halves);
-            let (curvature, most_q) =
-                collect(&mut self.image, &self.direction, &self.halves, most_p)?;
+            matrix.products(matrix.scaled(), &self.direction, &mut self.image);
+            let (curvature, most_q) = collect(&mut self.image, &self.direction, most_p)?;
             if curvature <= 0.0 {
                 return None;
             }
@@ -144,34 +141,26 @@ impl Single {
     }
 }
 
-/// The image `q = p + (Â − 1) p` from its halves; returns `pᵀ q` and the largest `|q|`. `most` bounds `|p|`. `None` if a number
-/// is none, or out of hand.
+/// The image `q = p + (Â − 1) p`, of which `image` has the second part; returns `pᵀ q` and the largest `|q|`. `most` bounds
+/// `|p|`. `None` if a number is none, or out of hand.
 #[inline(always)]
-fn collect(
-    image: &mut [f32],
-    direction: &[f32],
-    halves: &[[f32; 2]],
-    most: f32,
-) -> Option<(f64, f32)> {
-    // No packing has rows of Â with such sums; of one that has, the products are too large for this scale.
+fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)> {
     let products = Products::below(most, ROW * most)?;
     let (mut total, mut largest) = (0, [0; CHAINS]);
-    let stretches = image.chunks_mut(STRETCH).zip(direction.chunks(STRETCH));
-    for ((q, p), halves) in stretches.zip(halves.chunks(STRETCH)) {
+    for (q, p) in image.chunks_mut(STRETCH).zip(direction.chunks(STRETCH)) {
         let (q16, q_rest) = q.as_chunks_mut::<CHAINS>();
         let (p16, p_rest) = p.as_chunks::<CHAINS>();
-        let (h16, h_rest) = halves.as_chunks::<CHAINS>();
         let mut sums = [0; CHAINS];
-        for ((q, p), h) in q16.iter_mut().zip(p16).zip(h16) {
+        for (q, p) in q16.iter_mut().zip(p16) {
             for k in 0..CHAINS {
-                q[k] = (p[k] + h[k][0]) + h[k][1];
+                q[k] += p[k];
                 sums[k] = products.add(sums[k], p[k], q[k]);
                 largest[k] = largest[k].max(magnitude(q[k]));
             }
         }
         total += products.total(sums, q16.len());
-        for ((q, p), h) in q_rest.iter_mut().zip(p_rest).zip(h_rest) {
-            *q = (p + h[0]) + h[1];
+        for (q, p) in q_rest.iter_mut().zip(p_rest) {
+            *q += p;
             total += i64::from(products.integer(*p, *q));
             largest[0] = largest[0].max(magnitude(*q));
         }
