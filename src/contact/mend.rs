@@ -7,13 +7,16 @@
 //! very iterations of the whole system, without the zeros. What is left of `r` adds to `ρ`, and the sum is kept below the
 //! tolerance.
 //!
+//! Each exchange has a patch of its own, and is made on the forces that the ones before have left: in a large packing most lie far
+//! apart, and each needs but the iterations that it asks for. Where patches meet, what they leave is added up.
+//!
 //! Contacts beyond the patch keep their forces, so that none of them begins to pull; the gap of a pair depends on the
 //! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
 
 use super::complementarity::{Offence, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
-use super::patch::{Added, GONE, NOWHERE, Patch, Whole};
+use super::patch::{GONE, NOWHERE, Patch, Whole};
 use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::{Direction, G_AT_CONTACT, G_MAX};
 use crate::packing::{Packing, unit_and_length};
@@ -29,7 +32,9 @@ impl ContactLaw {
         let mut patch = core::mem::take(&mut self.patch);
         let known = self.pairs.len();
         patch.place.resize(known, NOWHERE);
+        patch.left_of.resize(known, 0.0);
         patch.block.resize(packing.len(), NOWHERE);
+        patch.is_visited.resize(packing.len(), false);
         for &c in &self.at_rest {
             patch.place[c as usize] = GONE;
         }
@@ -46,10 +51,10 @@ impl ContactLaw {
             }
             patch.place[c as usize] = NOWHERE;
         }
-        for (k, added) in patch.added.iter().enumerate() {
+        for (k, pair) in patch.added_pairs().enumerate() {
             if patch.place[known + k] != GONE {
-                self.offending
-                    .push(Offence::Add(added.pair, self.forces[known + k]));
+                let force = self.forces[known + k];
+                self.offending.push(Offence::Add(pair, force));
             }
         }
         self.offending
@@ -63,17 +68,32 @@ impl ContactLaw {
 
     fn mend_in(&mut self, packing: &Packing, patch: &mut Patch) -> bool {
         let allowed = self.allowed(self.scale());
+        let (before, tolerance) = (self.off, ACCEPTED * allowed);
         for _ in 0..ROUNDS {
             self.work.patches += 1;
-            self.disturb(packing, patch);
-            let most = self.contact_count() / 4;
-            let (whole, forces) = self.whole(packing);
-            let Some((iterations, left)) = patch.descend(whole, forces, 0.5 * allowed, most) else {
-                return false;
-            };
-            self.work.patch_iterations += iterations as u64;
-            self.off += left;
-            if self.off > 2.0 * allowed || !self.inspect_patch(packing, patch, ACCEPTED * allowed) {
+            patch.begin_round();
+            let offending = core::mem::take(&mut self.offending);
+            for offence in &offending {
+                let Some((contact, change)) = self.change(packing, patch, *offence, tolerance)
+                else {
+                    continue;
+                };
+                patch.clear();
+                let most = self.contact_count() / 4;
+                let (whole, forces) = self.whole(packing);
+                patch.disturb(whole, contact, change);
+                let descent = patch.descend(whole, forces, 0.5 * allowed, most);
+                let Some((iterations, left)) = descent else {
+                    return false;
+                };
+                self.work.patch_iterations += iterations as u64;
+                self.off = self.off.max(before + patch.leave(left));
+                if self.off > 2.0 * allowed {
+                    return false;
+                }
+            }
+            self.offending = offending;
+            if !self.inspect_round(packing, patch, tolerance) {
                 return false;
             }
             if self.offending.is_empty() {
@@ -93,66 +113,70 @@ impl ContactLaw {
         (whole, &mut self.forces)
     }
 
-    /// Exchanges the offending contacts, and a patch around them with the residual that this leaves.
-    fn disturb(&mut self, packing: &Packing, patch: &mut Patch) {
-        patch.clear();
-        let known = self.pairs.len();
-        let mut changes = Vec::with_capacity(self.offending.len());
-        for at in 0..self.offending.len() {
-            let (contact, change) = match self.offending[at] {
-                Offence::Drop(contact, _) => {
-                    patch.place[contact] = GONE;
-                    if contact < known && !self.is_at_rest(contact) {
-                        patch.gone.push(contact as u32);
-                    }
-                    (contact, -core::mem::take(&mut self.forces[contact]))
+    /// Exchanges an offending pair, if it still offends by more than `tolerance` (length); returns its contact and by how much
+    /// the force of that has changed.
+    fn change(
+        &mut self,
+        packing: &Packing,
+        patch: &mut Patch,
+        offence: Offence,
+        tolerance: f64,
+    ) -> Option<(usize, f64)> {
+        match offence {
+            Offence::Drop(contact, _) => {
+                if self.forces[contact] > 0.0 {
+                    return None;
                 }
-                Offence::Add(pair, guess) => {
-                    let (whole, _) = self.whole(packing);
-                    let contact = if let Some(contact) = patch.find(whole, pair) {
-                        patch.gone.retain(|&c| c as usize != contact);
-                        patch.place[contact] = NOWHERE;
-                        contact
-                    } else {
-                        let [i, j] = pair.map(|p| p as usize);
-                        let (normal, _) = unit_and_length(packing.separation(i, j));
-                        let toward = Direction::of(-normal);
-                        patch.added.push(Added { pair, toward });
-                        patch.place.push(NOWHERE);
-                        self.forces.push(0.0);
-                        self.forces.len() - 1
-                    };
-                    self.forces[contact] = guess;
-                    (contact, guess)
+                patch.place[contact] = GONE;
+                if contact < self.pairs.len() && !self.is_at_rest(contact) {
+                    patch.gone.push(contact as u32);
                 }
-            };
-            changes.push((contact, change));
-        }
-        patch.added_of.clear();
-        for (k, added) in patch.added.iter().enumerate() {
-            let ([i, j], k) = (added.pair, k as u32);
-            patch.added_of.extend([[i, j, k], [j, i, k]]);
-        }
-        patch.added_of.sort_unstable();
-        let (whole, _) = self.whole(packing);
-        for (contact, change) in changes {
-            patch.disturb(whole, contact, change);
+                let force = core::mem::take(&mut self.forces[contact]);
+                Some((contact, -force))
+            }
+            Offence::Add(pair, _) => {
+                let guess = self.overlap_force(packing, patch, pair, tolerance)?;
+                let (whole, _) = self.whole(packing);
+                let contact = if let Some(contact) = patch.find(whole, pair) {
+                    patch.gone.retain(|&c| c as usize != contact);
+                    patch.place[contact] = NOWHERE;
+                    contact
+                } else {
+                    let [i, j] = pair.map(|p| p as usize);
+                    let (normal, _) = unit_and_length(packing.separation(i, j));
+                    patch.add(pair, Direction::of(-normal));
+                    self.forces.push(0.0);
+                    self.forces.len() - 1
+                };
+                self.forces[contact] = guess;
+                Some((contact, guess))
+            }
         }
     }
 
-    /// Lists the pairs around the patch that offend; `false` if the forces are absurd.
-    fn inspect_patch(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
+    /// Lists the pairs that offend around the patches of a round; `false` if the forces are absurd.
+    fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
         let radii = packing.radii();
         let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let widest = WIDEST_BULGE * packing.largest_radius();
-        let (mut first, mut largest) = (0, 0.0f64);
-        for (&p, &end) in patch.particles.iter().zip(&patch.ends) {
+        self.offending.clear();
+        let mut largest: f64 = 0.0;
+        for &p in &patch.visited {
             let mut bulge = 0.0;
-            for &place in &patch.member[first..end] {
-                let f = self.forces[patch.contacts[place as usize] as usize];
+            let whole = Whole {
+                packing,
+                geometry: &self.geometry,
+                pairs: &self.pairs,
+                per_radius,
+            };
+            for (contact, _) in patch.contacts_of(whole, p) {
+                let f = self.forces[contact];
                 bulge += if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
+                if f <= 0.0 && patch.place[contact] != GONE {
+                    let pair = patch.pair(whole, contact);
+                    self.offending.push(Offence::Drop(contact, pair));
+                }
             }
-            first = end;
             bulge *= (1.0 + 1e-12) * radii[p as usize] * per_radius;
             if bulge.is_nan() || bulge > widest {
                 return false;
@@ -164,22 +188,10 @@ impl ContactLaw {
             self.cover(packing, largest);
             self.part();
         }
-        self.offending.clear();
         let known = self.pairs.len();
-        for &c in &patch.contacts {
-            let c = c as usize;
-            if self.forces[c] <= 0.0 {
-                let (whole, _) = self.whole(packing);
-                let pair = patch.pair(whole, c);
-                self.offending.push(Offence::Drop(c, pair));
-            }
-        }
+        let is_near = |pair: [u32; 2]| pair.iter().any(|p| patch.is_visited[*p as usize]);
         let others = core::mem::take(&mut self.others);
-        for &pair in &others {
-            let [i, j] = pair.map(|p| p as usize);
-            if patch.block[i] == NOWHERE && patch.block[j] == NOWHERE {
-                continue;
-            }
+        for pair in others.iter().copied().filter(|pair| is_near(*pair)) {
             let came = patch.find_added(pair);
             if came.is_none_or(|k| patch.place[known + k] == GONE) {
                 self.inspect_pair(packing, patch, pair, tolerance);
@@ -189,8 +201,7 @@ impl ContactLaw {
         let at_rest = core::mem::take(&mut self.at_rest);
         for &c in &at_rest {
             let pair = self.pairs[c as usize];
-            let near = pair.iter().any(|p| patch.block[*p as usize] != NOWHERE);
-            if near && patch.place[c as usize] == GONE {
+            if patch.place[c as usize] == GONE && is_near(pair) {
                 self.inspect_pair(packing, patch, pair, tolerance);
             }
         }
@@ -198,9 +209,10 @@ impl ContactLaw {
         for &c in &patch.gone {
             self.inspect_pair(packing, patch, self.pairs[c as usize], tolerance);
         }
-        // The same order whichever of them have numbers.
+        // A contact between two particles that were visited was met twice.
         self.offending
             .sort_unstable_by_key(|offence| offence.pair());
+        self.offending.dedup_by_key(|offence| offence.pair());
         true
     }
 
@@ -212,30 +224,45 @@ impl ContactLaw {
     fn inspect_pair(&mut self, packing: &Packing, patch: &Patch, pair: [u32; 2], tolerance: f64) {
         let [i, j] = pair.map(|p| p as usize);
         let radii = packing.radii();
-        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let separation = packing.separation(i, j);
         let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
         self.work.distances += 1;
         if separation.norm_squared() >= reach * reach {
             return;
         }
-        self.work.gaps += 1;
+        if let Some(guess) = self.overlap_force(packing, patch, pair, tolerance) {
+            self.offending.push(Offence::Add(pair, guess));
+        }
+    }
+
+    /// A first guess of the force of a pair without one whose contours overlap by more than `tolerance` (length).
+    fn overlap_force(
+        &mut self,
+        packing: &Packing,
+        patch: &Patch,
+        pair: [u32; 2],
+        tolerance: f64,
+    ) -> Option<f64> {
+        let [i, j] = pair.map(|p| p as usize);
+        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let whole = Whole {
             packing,
             geometry: &self.geometry,
             pairs: &self.pairs,
             per_radius,
         };
+        self.work.gaps += 1;
         let forces = &self.forces;
         let gap = gap_of(packing, self.line_tension, [i, j], |p| {
             let contacts = patch.contacts_of(whole, p as u32);
             contacts.map(|(contact, toward)| (forces[contact], toward))
         });
         if gap < -tolerance {
-            let compliance = -G_AT_CONTACT * (radii[i] + radii[j]) * per_radius;
-            self.offending.push(Offence::Add(pair, -gap / compliance));
+            let sum = packing.radii()[i] + packing.radii()[j];
+            Some(gap / (G_AT_CONTACT * sum * per_radius))
         } else {
             self.tolerated = self.tolerated.max(-gap);
+            None
         }
     }
 }

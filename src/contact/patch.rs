@@ -13,10 +13,10 @@ pub(super) const GONE: u32 = u32::MAX - 1;
 
 /// A contact that came to the set.
 #[derive(Clone, Debug)]
-pub(super) struct Added {
-    pub(super) pair: [u32; 2],
+struct Added {
+    pair: [u32; 2],
     /// From the lower particle to the higher.
-    pub(super) toward: Direction,
+    toward: Direction,
 }
 
 impl Added {
@@ -37,7 +37,7 @@ pub(super) struct Patch {
     pub(super) place: Vec<u32>,
     /// The contacts of the structure that have left.
     pub(super) gone: Vec<u32>,
-    pub(super) added: Vec<Added>,
+    added: Vec<Added>,
     /// `(particle, partner, number in added)`, ascending.
     pub(super) added_of: Vec<[u32; 3]>,
     /// The block of each particle, [`NOWHERE`] if it is not in the patch, and the particles of the blocks.
@@ -54,6 +54,12 @@ pub(super) struct Patch {
     pub(super) contacts: Vec<u32>,
     pub(super) rows: Vec<Row>,
     room: Vec<(usize, Direction)>,
+    /// The particles of the patches of this round, and which they are.
+    pub(super) visited: Vec<u32>,
+    pub(super) is_visited: Vec<bool>,
+    /// The residual that patches have left at each contact (length), and the contacts where there is any.
+    pub(super) left_of: Vec<f64>,
+    reached: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,6 +88,11 @@ impl Patch {
         let numbered = whole.geometry.duplicate().find(pair);
         let added = || self.find_added(pair).map(|k| whole.pairs.len() + k);
         numbered.map(|c| c as usize).or_else(added)
+    }
+
+    /// The pairs that came, some of which may have gone again.
+    pub(super) fn added_pairs(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.added.iter().map(|added| added.pair)
     }
 
     pub(super) fn find_added(&self, pair: [u32; 2]) -> Option<usize> {
@@ -162,9 +173,50 @@ impl Patch {
         self.value.clear();
     }
 
+    /// A new round of exchanges.
+    pub(super) fn begin_round(&mut self) {
+        for p in self.visited.drain(..) {
+            self.is_visited[p as usize] = false;
+        }
+    }
+
+    /// Takes note of where the patch is and of the residual that was `left` there; returns the largest sum of what patches have
+    /// left at one contact.
+    pub(super) fn leave(&mut self, left: f64) -> f64 {
+        for &p in &self.particles {
+            if !core::mem::replace(&mut self.is_visited[p as usize], true) {
+                self.visited.push(p);
+            }
+        }
+        let there = self.contacts.iter().map(|c| self.left_of[*c as usize]);
+        let sum = left + there.fold(0.0, f64::max);
+        for &c in &self.contacts {
+            if core::mem::replace(&mut self.left_of[c as usize], sum) == 0.0 {
+                self.reached.push(c);
+            }
+        }
+        sum
+    }
+
+    /// One more contact that came, in the direction from its lower particle to the higher.
+    pub(super) fn add(&mut self, pair: [u32; 2], toward: Direction) {
+        let ([i, j], k) = (pair, self.added.len() as u32);
+        self.added.push(Added { pair, toward });
+        self.added_of.extend([[i, j, k], [j, i, k]]);
+        self.added_of.sort_unstable();
+        self.place.push(NOWHERE);
+        self.left_of.push(0.0);
+    }
+
     /// Forgets the exchanges too.
     pub(super) fn finish(&mut self) {
         self.clear();
+        self.begin_round();
+        for c in self.reached.drain(..) {
+            self.left_of[c as usize] = 0.0;
+        }
+        self.left_of
+            .truncate(self.left_of.len() - self.added.len());
         for c in self.gone.drain(..) {
             self.place[c as usize] = NOWHERE;
         }
