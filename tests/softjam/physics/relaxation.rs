@@ -141,6 +141,36 @@ fn run_taken_up_at_any_frame_ends_in_the_same_bits() {
     }
 }
 
+/// A run numbers its contacts by when they came; one that is taken up numbers them by their pairs. No bit may depend on it.
+#[test]
+fn numbers_of_contacts_reach_no_bit() {
+    let scene = Scene {
+        disks: DiskParameters {
+            threshold: 1e-2,
+            ..DiskParameters::default()
+        },
+        steps: 400,
+        ..scene(300, 0.87, 6)
+    };
+    let packing = start::packing(&scene).unwrap();
+    let mut run = Relaxation::new(&scene).unwrap();
+    let mut exchanges = 0;
+    while run.status() == Status::Running {
+        let frame = run.frame();
+        let contacts = frame.contacts.clone();
+        let mut again = Relaxation::resume(&scene, packing.clone(), frame).unwrap();
+        run.advance().unwrap();
+        again.advance().unwrap();
+        exchanges += u32::from(run.contacts().pairs != contacts);
+        assert_eq!(run.frame().digest(), again.frame().digest());
+        assert_eq!(run.law().residual(), again.law().residual());
+        assert_eq!(run.net_forces(), again.net_forces());
+        assert_eq!(run.observables(), again.observables());
+    }
+    let structures = run.law().work().structures;
+    assert!(exchanges > 100 && structures < 40, "{exchanges}, {structures}");
+}
+
 #[test]
 fn same_scene_walks_the_same_bits() {
     let scene = scene(100, 0.87, 9);
