@@ -71,6 +71,7 @@ pub struct DiskReport {
 pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f64) -> DiskReport {
     let fire = Fire::default();
     let mut neighbors = NeighborList::new();
+    let mut sums = Vec::new();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
     let mut net = vec![Vec2::zeros(); packing.len()];
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
@@ -79,10 +80,15 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let skin = SKIN * packing.largest_radius();
     let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
-        neighbors.update_after(packing, 0.0, skin, moved);
+        if neighbors.update_after(packing, 0.0, skin, moved) {
+            let radii = packing.radii();
+            let sum = |pair: &[u32; 2]| radii[pair[0] as usize] + radii[pair[1] as usize];
+            sums.clear();
+            sums.extend(neighbors.pairs().iter().map(sum));
+        }
         wide(
             #[inline(always)]
-            || disk_forces(packing, neighbors.pairs(), line_tension, &mut net),
+            || disk_forces(packing, neighbors.pairs(), &sums, line_tension, &mut net),
         );
         let f_max = largest_force(&net) / line_tension;
         let converged = f_max <= parameters.threshold;
@@ -124,56 +130,68 @@ const SKIN: f64 = 0.3;
 /// Pairs that are computed together: their numbers stay in the fastest memory.
 const LANES: usize = 128;
 
-/// Net forces of the disks into `net`, from candidates that ascend.
+/// Net forces of the disks into `net`, from candidates that ascend and the sums `R_i + R_j` of their radii.
 ///
-/// In three passes over a bunch of pairs: separations from scattered positions, forces by columns and without a branch
+/// In three passes over a bunch of pairs: separations from scattered positions, forces in one simple loop without a branch
 /// (which of the candidates touch is nothing that a processor could guess; those that do not give zero), and their sums in
 /// the order of the candidates.
 #[inline(always)]
-fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
+fn disk_forces(
+    packing: &Packing,
+    candidates: &[[u32; 2]],
+    sums: &[f64],
+    line_tension: f64,
+    net: &mut [Vec2],
+) {
     net.fill(Vec2::zeros());
-    let (positions, radii) = (packing.positions(), packing.radii());
+    let positions = packing.positions();
     let sides = packing.domain().lengths();
     let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
-    let (mut x, mut y, mut sum) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
-    let mut distance = [0.0; LANES];
-    for pairs in candidates.chunks(LANES) {
-        let columns = x.iter_mut().zip(&mut y).zip(&mut sum);
-        for (&[i, j], ((x, y), sum)) in pairs.iter().zip(columns) {
-            let difference = positions[i as usize] - positions[j as usize];
-            (*x, *y) = (difference.x, difference.y);
-            *sum = radii[i as usize] + radii[j as usize];
+    let mut separations = [Vec2::zeros(); LANES];
+    let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+    // Pairs of one particle follow each other: its sum stays out of memory until they end.
+    let (mut first, mut sum_of_first) = (0, Vec2::zeros());
+    for (pairs, sums) in candidates.chunks(LANES).zip(sums.chunks(LANES)) {
+        for (&[i, j], separation) in pairs.iter().zip(&mut separations) {
+            *separation = positions[i as usize] - positions[j as usize];
         }
-        // One simple loop a quantity, so that each is done several pairs at a time.
-        for x in &mut x {
-            *x = nearest(*x, sides.x);
-        }
-        for y in &mut y {
-            *y = nearest(*y, sides.y);
-        }
-        for k in 0..LANES {
-            distance[k] = (x[k] * x[k] + y[k] * y[k]).sqrt();
-        }
-        for k in 0..LANES {
+        let mut coincident = false;
+        let columns = x.iter_mut().zip(&mut y);
+        for ((separation, sum), (x, y)) in separations.iter().zip(sums).zip(columns) {
+            (*x, *y) = (nearest(separation.x, sides.x), nearest(separation.y, sides.y));
+            let distance = (*x * *x + *y * *y).sqrt();
+            coincident |= distance == 0.0;
             // n f = (r/|r|) k δ
-            let factor = stiffness_sum * (sum[k] - distance[k]) / (sum[k] * distance[k]);
-            let touching = distance[k] < sum[k];
-            let factor = if touching { factor } else { 0.0 };
-            x[k] *= factor;
-            y[k] *= factor;
+            let factor = stiffness_sum * (sum - distance) / (sum * distance);
+            let factor = if distance < *sum { factor } else { 0.0 };
+            (*x, *y) = (*x * factor, *y * factor);
         }
-        if distance.contains(&0.0) {
+        if coincident {
             // Coincident centres are told apart along x, as in `unit_and_length`.
-            for k in (0..LANES).filter(|k| distance[*k] == 0.0) {
-                (x[k], y[k]) = (stiffness_sum, 0.0);
+            for k in 0..pairs.len() {
+                if coincide(packing, pairs[k]) {
+                    (x[k], y[k]) = (stiffness_sum, 0.0);
+                }
             }
         }
         for (&[i, j], (x, y)) in pairs.iter().zip(x.iter().zip(&y)) {
             let force = Vec2::new(*x, *y);
-            net[i as usize] += force;
+            if i != first {
+                net[first as usize] = sum_of_first;
+                (first, sum_of_first) = (i, net[i as usize]);
+            }
+            sum_of_first += force;
             net[j as usize] -= force;
         }
     }
+    net[first as usize] = sum_of_first;
+}
+
+/// Whether the distance of two centres is zero, if only by rounding.
+#[cold]
+fn coincide(packing: &Packing, [i, j]: [u32; 2]) -> bool {
+    let separation = packing.separation(i as usize, j as usize);
+    separation.x * separation.x + separation.y * separation.y == 0.0
 }
 
 /// The pairs of disks that overlap.
