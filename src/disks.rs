@@ -102,19 +102,13 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
                 rattlers,
             };
         }
-        fire.advance(
+        moved = fire.advance(
             &mut state,
             &net,
             &mut velocities,
             packing.positions_mut(),
             domain,
         );
-        // A step uphill goes back first.
-        moved = if state.downhill > 0 {
-            state.dt * largest_force(&velocities)
-        } else {
-            f64::INFINITY
-        };
         step += 1;
     }
 }
