@@ -4,8 +4,9 @@
 //! distances, and the pairs come in ascending order, so neither the age nor the reach of the list can reach a result:
 //! a replay that starts with a fresh list walks the same bits.
 
-use crate::domain::{Domain, Vec2};
+use crate::domain::{Domain, Vec2, nearest};
 use crate::packing::Packing;
+use crate::wide::wide;
 
 /// All pairs `i < j` whose undeformed surfaces were closer than `reach` when the list was built, ascending.
 ///
@@ -140,64 +141,95 @@ impl NeighborList {
 /// Particles sorted into cells at least as wide as the longest distance asked for: O(N) to fill and to search.
 #[derive(Clone, Debug, Default)]
 struct CellList {
-    /// The particles of cell c are `particle[first[c]..first[c + 1]]`, ascending.
+    /// The particles of cell c are `seats[first[c]..first[c + 1]]`.
     first: Vec<u32>,
-    particle: Vec<u32>,
+    seats: Vec<Seat>,
     cell_of: Vec<u32>,
+    near: Vec<u32>,
+}
+
+/// A particle in a cell, with what its distances take.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seat {
+    at: Vec2,
+    radius: f64,
+    particle: u32,
 }
 
 impl CellList {
     fn pairs_within(&mut self, packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
         pairs.clear();
         let longest = 2.0 * packing.largest_radius() + reach;
-        let near = |i: u32, j: u32| {
-            let (i, j) = (i as usize, j as usize);
-            let sum = packing.radii()[i] + packing.radii()[j] + reach;
-            packing.separation(i, j).norm_squared() < sum * sum
-        };
-        let n = packing.len() as u32;
         let Some(grid) = Grid::new(packing.domain(), longest, packing.len()) else {
             // Fewer than three cells along a side: every pair is a neighbour pair of cells anyway.
+            let n = packing.len() as u32;
+            let near = |i: u32, j: u32| {
+                let (i, j) = (i as usize, j as usize);
+                let sum = packing.radii()[i] + packing.radii()[j] + reach;
+                packing.separation(i, j).norm_squared() < sum * sum
+            };
             for i in 0..n {
                 pairs.extend((i + 1..n).filter(|&j| near(i, j)).map(|j| [i, j]));
             }
             return;
         };
-        self.fill(packing.positions(), grid);
-        for i in 0..n {
-            let start = pairs.len();
-            for cell in grid.around(self.cell_of[i as usize]) {
-                let (a, b) = (self.first[cell] as usize, self.first[cell + 1] as usize);
-                pairs.extend(
-                    self.particle[a..b]
-                        .iter()
-                        .filter(|&&j| j > i && near(i, j))
-                        .map(|&j| [i, j]),
-                );
+        self.fill(packing, grid);
+        wide(
+            #[inline(always)]
+            || self.search(packing, reach, grid, pairs),
+        );
+    }
+
+    #[inline(always)]
+    fn search(&mut self, packing: &Packing, reach: f64, grid: Grid, pairs: &mut Vec<[u32; 2]>) {
+        let sides = packing.domain().lengths();
+        let particles = packing.positions().iter().zip(packing.radii());
+        for ((i, &cell), (at, radius)) in (0..).zip(&self.cell_of).zip(particles) {
+            let mut found = 0;
+            for (from, to) in grid.around(cell) {
+                let seats = &self.seats[self.first[from] as usize..self.first[to] as usize];
+                if self.near.len() < found + seats.len() {
+                    self.near.resize(found + seats.len(), 0);
+                }
+                // Without a branch: nobody could guess who is near.
+                for seat in seats {
+                    let x = nearest(at.x - seat.at.x, sides.x);
+                    let y = nearest(at.y - seat.at.y, sides.y);
+                    let sum = radius + seat.radius + reach;
+                    self.near[found] = seat.particle;
+                    found += usize::from((seat.particle > i) & (x * x + y * y < sum * sum));
+                }
             }
-            pairs[start..].sort_unstable();
+            let near = &mut self.near[..found];
+            near.sort_unstable();
+            pairs.extend(near.iter().map(|&j| [i, j]));
         }
     }
 
     /// Counting sort of the particles by cell.
-    fn fill(&mut self, positions: &[Vec2], grid: Grid) {
+    fn fill(&mut self, packing: &Packing, grid: Grid) {
+        let positions = packing.positions();
         self.first.clear();
         self.first.resize(grid.columns * grid.rows + 1, 0);
         self.cell_of.clear();
         self.cell_of.extend(positions.iter().map(|&p| grid.cell(p)));
+        // Where each cell ends; filling from the end turns that into where it begins.
         for &c in &self.cell_of {
-            self.first[c as usize + 1] += 1;
+            self.first[c as usize] += 1;
         }
         for c in 1..self.first.len() {
             self.first[c] += self.first[c - 1];
         }
-        self.particle.clear();
-        self.particle.resize(positions.len(), 0);
-        let mut next = self.first.clone();
-        for (i, &c) in self.cell_of.iter().enumerate() {
-            let slot = &mut next[c as usize];
-            self.particle[*slot as usize] = i as u32;
-            *slot += 1;
+        self.seats.clear();
+        self.seats.resize(positions.len(), Seat::default());
+        for (i, &c) in self.cell_of.iter().enumerate().rev() {
+            let slot = &mut self.first[c as usize];
+            *slot -= 1;
+            self.seats[*slot as usize] = Seat {
+                at: positions[i],
+                radius: packing.radii()[i],
+                particle: i as u32,
+            };
         }
     }
 }
@@ -230,17 +262,24 @@ impl Grid {
         (row * self.columns + column) as u32
     }
 
-    /// The nine cells around one, itself included.
-    fn around(&self, cell: u32) -> [usize; 9] {
-        let (column, row) = (cell as usize % self.columns, cell as usize / self.columns);
-        let near = |x: usize, n: usize| [(x + n - 1) % n, x, (x + 1) % n];
-        let mut cells = [0; 9];
-        for (a, r) in near(row, self.rows).into_iter().enumerate() {
-            for (b, c) in near(column, self.columns).into_iter().enumerate() {
-                cells[3 * a + b] = r * self.columns + c;
-            }
-        }
-        cells
+    /// The nine cells around one, itself included, as stretches of cells in a row: three, and three across the edge.
+    #[inline(always)]
+    fn around(&self, cell: u32) -> [(usize, usize); 6] {
+        let columns = self.columns as u32;
+        let (column, row) = ((cell % columns) as usize, (cell / columns) as usize);
+        let end = self.columns;
+        let [here, across] = if column == 0 {
+            [(0, 2), (end - 1, end)]
+        } else if column + 1 == end {
+            [(end - 2, end), (0, 1)]
+        } else {
+            [(column - 1, column + 2), (0, 0)]
+        };
+        let below = if row == 0 { self.rows } else { row } - 1;
+        let above = if row + 1 == self.rows { 0 } else { row + 1 };
+        let [a, b, c] = [below, row, above].map(|row| row * end);
+        [(a, here), (b, here), (c, here), (a, across), (b, across), (c, across)]
+            .map(|(row, (from, to))| (row + from, row + to))
     }
 }
 
