@@ -141,11 +141,15 @@ impl NeighborList {
 /// Particles sorted into cells at least as wide as the longest distance asked for: O(N) to fill and to search.
 #[derive(Clone, Debug, Default)]
 struct CellList {
-    /// The particles of cell c are `seats[first[c]..first[c + 1]]`.
-    first: Vec<u32>,
+    /// The particles in their own order, and in that of their cells.
+    particles: Vec<Seat>,
     seats: Vec<Seat>,
-    cell_of: Vec<u32>,
-    near: Vec<u32>,
+    /// Cell c has `seats[first[c]..first[c + 1]]`.
+    first: Vec<u32>,
+    /// Pairs in the order in which the cells give them, and in that of their second particles.
+    found: Vec<[u32; 2]>,
+    by_second: Vec<[u32; 2]>,
+    slots: Vec<u32>,
 }
 
 /// A particle in a cell, with what its distances take.
@@ -154,83 +158,114 @@ struct Seat {
     at: Vec2,
     radius: f64,
     particle: u32,
+    cell: u32,
 }
 
 impl CellList {
     fn pairs_within(&mut self, packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
-        pairs.clear();
         let longest = 2.0 * packing.largest_radius() + reach;
-        let Some(grid) = Grid::new(packing.domain(), longest, packing.len()) else {
+        let n = packing.len();
+        let Some(grid) = Grid::new(packing.domain(), longest, n) else {
             // Fewer than three cells along a side: every pair is a neighbour pair of cells anyway.
-            let n = packing.len() as u32;
             let near = |i: u32, j: u32| {
                 let (i, j) = (i as usize, j as usize);
                 let sum = packing.radii()[i] + packing.radii()[j] + reach;
                 packing.separation(i, j).norm_squared() < sum * sum
             };
-            for i in 0..n {
-                pairs.extend((i + 1..n).filter(|&j| near(i, j)).map(|j| [i, j]));
+            pairs.clear();
+            for i in 0..n as u32 {
+                pairs.extend((i + 1..n as u32).filter(|&j| near(i, j)).map(|j| [i, j]));
             }
             return;
         };
         self.fill(packing, grid);
-        wide(
+        let count = wide(
             #[inline(always)]
-            || self.search(packing, reach, grid, pairs),
+            || self.search(packing.domain(), reach, grid),
         );
+        let (found, slots) = (&self.found[..count], &mut self.slots);
+        sort_by_number(found, &mut self.by_second, slots, n, |pair| pair[1]);
+        sort_by_number(&self.by_second, pairs, slots, n, |pair| pair[0]);
     }
 
+    fn fill(&mut self, packing: &Packing, grid: Grid) {
+        let places = packing.positions().iter().zip(packing.radii());
+        self.particles.clear();
+        self.particles
+            .extend((0..).zip(places).map(|(particle, (&at, &radius))| Seat {
+                at,
+                radius,
+                particle,
+                cell: grid.cell(at),
+            }));
+        let cells = grid.columns * grid.rows;
+        let (seats, first) = (&mut self.seats, &mut self.first);
+        sort_by_number(&self.particles, seats, first, cells, |seat| seat.cell);
+    }
+
+    /// Looks once at each two particles of neighbouring cells; says how many pairs were found.
     #[inline(always)]
-    fn search(&mut self, packing: &Packing, reach: f64, grid: Grid, pairs: &mut Vec<[u32; 2]>) {
-        let sides = packing.domain().lengths();
-        let particles = packing.positions().iter().zip(packing.radii());
-        for ((i, &cell), (at, radius)) in (0..).zip(&self.cell_of).zip(particles) {
-            let mut found = 0;
-            for (from, to) in grid.around(cell) {
-                let seats = &self.seats[self.first[from] as usize..self.first[to] as usize];
-                if self.near.len() < found + seats.len() {
-                    self.near.resize(found + seats.len(), 0);
-                }
-                // Without a branch: nobody could guess who is near.
-                for seat in seats {
-                    let x = nearest(at.x - seat.at.x, sides.x);
-                    let y = nearest(at.y - seat.at.y, sides.y);
-                    let sum = radius + seat.radius + reach;
-                    self.near[found] = seat.particle;
-                    found += usize::from((seat.particle > i) & (x * x + y * y < sum * sum));
+    fn search(&mut self, domain: Domain, reach: f64, grid: Grid) -> usize {
+        let sides = domain.lengths();
+        let mut count = 0;
+        for cell in 0..grid.columns * grid.rows {
+            let mut ahead = grid
+                .ahead(cell)
+                .map(|(from, to)| self.first[from] as usize..self.first[to] as usize);
+            let here = self.first[cell] as usize..self.first[cell + 1] as usize;
+            let most: usize = ahead.iter().map(ExactSizeIterator::len).sum();
+            if self.found.len() < count + here.len() * most {
+                self.found.resize(count + here.len() * most, [0; 2]);
+            }
+            for k in here {
+                let seat = self.seats[k];
+                ahead[0].start = k + 1;
+                for others in &ahead {
+                    let others = &self.seats[others.clone()];
+                    let slots = &mut self.found[count..][..others.len()];
+                    let mut near = 0;
+                    // Without a branch: nobody could guess who is near.
+                    for other in others {
+                        let x = nearest(seat.at.x - other.at.x, sides.x);
+                        let y = nearest(seat.at.y - other.at.y, sides.y);
+                        let sum = seat.radius + other.radius + reach;
+                        let (i, j) = (seat.particle, other.particle);
+                        slots[near] = [i.min(j), i.max(j)];
+                        near += usize::from(x * x + y * y < sum * sum);
+                    }
+                    count += near;
                 }
             }
-            let near = &mut self.near[..found];
-            near.sort_unstable();
-            pairs.extend(near.iter().map(|&j| [i, j]));
         }
+        count
     }
+}
 
-    /// Counting sort of the particles by cell.
-    fn fill(&mut self, packing: &Packing, grid: Grid) {
-        let positions = packing.positions();
-        self.first.clear();
-        self.first.resize(grid.columns * grid.rows + 1, 0);
-        self.cell_of.clear();
-        self.cell_of.extend(positions.iter().map(|&p| grid.cell(p)));
-        // Where each cell ends; filling from the end turns that into where it begins.
-        for &c in &self.cell_of {
-            self.first[c as usize] += 1;
-        }
-        for c in 1..self.first.len() {
-            self.first[c] += self.first[c - 1];
-        }
-        self.seats.clear();
-        self.seats.resize(positions.len(), Seat::default());
-        for (i, &c) in self.cell_of.iter().enumerate().rev() {
-            let slot = &mut self.first[c as usize];
-            *slot -= 1;
-            self.seats[*slot as usize] = Seat {
-                at: positions[i],
-                radius: packing.radii()[i],
-                particle: i as u32,
-            };
-        }
+/// Counting sort of `items` into `sorted` by a number below `numbers`; equal ones keep their order. Those of number c
+/// become `sorted[first[c]..first[c + 1]]`.
+fn sort_by_number<T: Copy + Default>(
+    items: &[T],
+    sorted: &mut Vec<T>,
+    first: &mut Vec<u32>,
+    numbers: usize,
+    number: impl Fn(&T) -> u32,
+) {
+    first.clear();
+    first.resize(numbers + 1, 0);
+    for item in items {
+        first[number(item) as usize] += 1;
+    }
+    // Where each number ends; filling backwards turns that into where it begins.
+    let mut end = 0;
+    for count in &mut *first {
+        end += *count;
+        *count = end;
+    }
+    sorted.resize(items.len(), T::default());
+    for item in items.iter().rev() {
+        let slot = &mut first[number(item) as usize];
+        *slot -= 1;
+        sorted[*slot as usize] = *item;
     }
 }
 
@@ -262,24 +297,27 @@ impl Grid {
         (row * self.columns + column) as u32
     }
 
-    /// The nine cells around one, itself included, as stretches of cells in a row: three, and three across the edge.
+    /// A cell, the one to its right and the three above it, as stretches of cells of a row: the first begins with the
+    /// cell itself, and what lies across the edge makes stretches of its own.
     #[inline(always)]
-    fn around(&self, cell: u32) -> [(usize, usize); 6] {
-        let columns = self.columns as u32;
-        let (column, row) = ((cell % columns) as usize, (cell / columns) as usize);
-        let end = self.columns;
-        let [here, across] = if column == 0 {
-            [(0, 2), (end - 1, end)]
-        } else if column + 1 == end {
-            [(end - 2, end), (0, 1)]
+    fn ahead(&self, cell: usize) -> [(usize, usize); 4] {
+        let (column, end) = (cell % self.columns, self.columns);
+        let row = cell - column;
+        let above = if row + end == self.rows * end { 0 } else { row + end };
+        let (right, across) = if column + 1 == end {
+            (end, (row, row + 1))
         } else {
-            [(column - 1, column + 2), (0, 0)]
+            (column + 2, (row, row))
         };
-        let below = if row == 0 { self.rows } else { row } - 1;
-        let above = if row + 1 == self.rows { 0 } else { row + 1 };
-        let [a, b, c] = [below, row, above].map(|row| row * end);
-        [(a, here), (b, here), (c, here), (a, across), (b, across), (c, across)]
-            .map(|(row, (from, to))| (row + from, row + to))
+        let (three, beyond) = if column == 0 {
+            ((0, 2), (end - 1, end))
+        } else if column + 1 == end {
+            ((end - 2, end), (0, 1))
+        } else {
+            ((column - 1, column + 2), (0, 0))
+        };
+        let raised = |(from, to)| (above + from, above + to);
+        [(cell, row + right), across, raised(three), raised(beyond)]
     }
 }
 
