@@ -4,13 +4,15 @@
 //! on its own, so that both stages share their units. FIRE relaxes them from zero velocity. Work and memory are O(N) a
 //! step, by a Verlet list from a cell list.
 
-use crate::domain::{Vec2, nearest};
-use crate::force::{backbone, largest_force, mean_coordination};
+mod forces;
+
+use crate::domain::Vec2;
+use crate::force::{backbone, mean_coordination};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 use crate::relax::fire::{Fire, FireState};
-use crate::wide::wide;
 use core::f64::consts::PI;
+use forces::Candidates;
 
 /// When the relaxation of the disks ends.
 ///
@@ -71,7 +73,7 @@ pub struct DiskReport {
 pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f64) -> DiskReport {
     let fire = Fire::default();
     let mut neighbors = NeighborList::new();
-    let mut sums = Vec::new();
+    let mut candidates = Candidates::default();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
     let mut net = vec![Vec2::zeros(); packing.len()];
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
@@ -82,23 +84,9 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
         if neighbors.update_after(packing, 0.0, skin, moved) {
-            let radii = packing.radii();
-            let sum = |pair: &[u32; 2]| radii[pair[0] as usize] + radii[pair[1] as usize];
-            sums.clear();
-            sums.extend(neighbors.pairs().iter().map(sum));
+            candidates.renew(packing.radii(), neighbors.pairs());
         }
-        let mut forces = |coincident| {
-            let pairs = (neighbors.pairs(), &*sums);
-            wide(
-                #[inline(always)]
-                || disk_forces(packing, pairs, coincident, line_tension, &mut net),
-            );
-            largest_force(&net) / line_tension
-        };
-        let mut f_max = forces(false);
-        if !f_max.is_finite() {
-            f_max = forces(true);
-        }
+        let f_max = candidates.forces(packing, line_tension, &mut net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
@@ -135,74 +123,6 @@ const DT_MAX: f64 = 0.41;
 /// A skin `s` lasts `s/2v` steps at `v` a step. A list costs as much as some eight pairs a particle, and holds some 1.2 `s/R`
 /// pairs a particle in vain: both together cost least near `s = √(12 v R)`.
 const SKIN: [f64; 2] = [0.05, 0.8];
-
-/// Pairs that are computed together: their numbers stay in the fastest memory.
-const LANES: usize = 128;
-
-/// Net forces of the disks into `net`, from candidates that ascend and the sums `R_i + R_j` of their radii.
-///
-/// Centres that coincide have no direction: unless `coincident` says that there may be such, some force is not finite.
-///
-/// In three passes over a bunch of pairs: separations from scattered positions, forces in one simple loop without a branch
-/// (which of the candidates touch is nothing that a processor could guess; those that do not give zero), and their sums in
-/// the order of the candidates.
-#[inline(always)]
-fn disk_forces(
-    packing: &Packing,
-    (candidates, sums): (&[[u32; 2]], &[f64]),
-    coincident: bool,
-    line_tension: f64,
-    net: &mut [Vec2],
-) {
-    net.fill(Vec2::zeros());
-    let positions = packing.positions();
-    let sides = packing.domain().lengths();
-    let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
-    let mut separations = [Vec2::zeros(); LANES];
-    let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-    // Pairs of one particle follow each other: its sum stays out of memory until they end.
-    let (mut first, mut sum_of_first) = (0, Vec2::zeros());
-    for (pairs, sums) in candidates.chunks(LANES).zip(sums.chunks(LANES)) {
-        for (&[i, j], separation) in pairs.iter().zip(&mut separations) {
-            *separation = positions[i as usize] - positions[j as usize];
-        }
-        let columns = x.iter_mut().zip(&mut y);
-        for ((separation, sum), (x, y)) in separations.iter().zip(sums).zip(columns) {
-            let dx = nearest(separation.x, sides.x);
-            let dy = nearest(separation.y, sides.y);
-            let distance = (dx * dx + dy * dy).sqrt();
-            let overlap = if *sum > distance { sum - distance } else { 0.0 };
-            // n f = (r/|r|) k δ
-            let factor = stiffness_sum * overlap / (sum * distance);
-            (*x, *y) = (dx * factor, dy * factor);
-        }
-        if coincident {
-            // Told apart along x, as in `unit_and_length`.
-            for (pair, (x, y)) in pairs.iter().zip(x.iter_mut().zip(&mut y)) {
-                if coincide(packing, *pair) {
-                    (*x, *y) = (stiffness_sum, 0.0);
-                }
-            }
-        }
-        for (&[i, j], (x, y)) in pairs.iter().zip(x.iter().zip(&y)) {
-            let force = Vec2::new(*x, *y);
-            if i != first {
-                net[first as usize] = sum_of_first;
-                (first, sum_of_first) = (i, net[i as usize]);
-            }
-            sum_of_first += force;
-            net[j as usize] -= force;
-        }
-    }
-    net[first as usize] = sum_of_first;
-}
-
-/// Whether the distance of two centres is zero, if only by rounding.
-#[cold]
-fn coincide(packing: &Packing, [i, j]: [u32; 2]) -> bool {
-    let separation = packing.separation(i as usize, j as usize);
-    separation.x * separation.x + separation.y * separation.y == 0.0
-}
 
 /// The pairs of disks that overlap.
 fn touching(packing: &Packing, neighbors: &NeighborList) -> Vec<[u32; 2]> {

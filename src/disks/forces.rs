@@ -1,0 +1,171 @@
+//! Forces of the disks, the hot loop of their relaxation.
+
+use crate::domain::{Vec2, nearest};
+use crate::force::largest_force;
+use crate::packing::Packing;
+use crate::wide::wide;
+use core::f64::consts::PI;
+
+/// Candidate pairs, ascending, with the sums `R_i + R_j` of their radii.
+#[derive(Default)]
+pub(super) struct Candidates {
+    pairs: Vec<[u32; 2]>,
+    sums: Vec<f64>,
+}
+
+impl Candidates {
+    pub(super) fn renew(&mut self, radii: &[f64], pairs: &[[u32; 2]]) {
+        self.pairs.clear();
+        self.pairs.extend(pairs);
+        self.sums.clear();
+        let sums = pairs.iter().map(|pair| radii[pair[0] as usize] + radii[pair[1] as usize]);
+        self.sums.extend(sums);
+    }
+
+    /// Net forces into `net`; the largest of them is returned.
+    pub(super) fn forces(&self, packing: &Packing, line_tension: f64, net: &mut [Vec2]) -> f64 {
+        let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
+        let (fours, pairs) = self.pairs.as_chunks::<4>();
+        let (sums_of_fours, sums) = self.sums.as_chunks::<4>();
+        net.fill(Vec2::zeros());
+        wide(
+            #[inline(always)]
+            || add_fours(packing, fours, sums_of_fours, stiffness_sum, net),
+        );
+        add(packing, pairs, sums, stiffness_sum, net);
+        let largest = largest_force(net);
+        if largest.is_finite() {
+            return largest;
+        }
+        // Coincident centres have no direction in `add_fours`.
+        net.fill(Vec2::zeros());
+        add(packing, &self.pairs, &self.sums, stiffness_sum, net);
+        largest_force(net)
+    }
+}
+
+/// Adds the forces of `pairs` to `net`, one by one.
+fn add(
+    packing: &Packing,
+    pairs: &[[u32; 2]],
+    sums: &[f64],
+    stiffness_sum: f64,
+    net: &mut [Vec2],
+) {
+    for (&[i, j], sum) in pairs.iter().zip(sums) {
+        let separation = packing.separation(i as usize, j as usize);
+        let distance = (separation.x * separation.x + separation.y * separation.y).sqrt();
+        let overlap = if *sum > distance { sum - distance } else { 0.0 };
+        let force = if distance == 0.0 {
+            // Coincident centres are told apart along x, as in `unit_and_length`.
+            Vec2::new(stiffness_sum, 0.0)
+        } else {
+            // n f = (r/|r|) k δ
+            separation * (stiffness_sum * overlap / (sum * distance))
+        };
+        net[i as usize] += force;
+        net[j as usize] -= force;
+    }
+}
+
+/// Four pairs under way.
+#[derive(Clone, Copy)]
+struct Four {
+    separation: [Vec2; 4],
+    x: [f64; 4],
+    y: [f64; 4],
+    distance: [f64; 4],
+}
+
+/// Fours under way at a time; a power of two, so that places are found by a mask.
+const UNDER_WAY: usize = 16;
+
+/// How many fours later a four goes through its next stage: what was stored can be loaded then.
+const LATER: usize = 2;
+
+/// What [`add`] does, four pairs at a time and without a branch: which of the candidates touch is nothing that a
+/// processor could guess; those that do not give zero.
+///
+/// A four goes through five stages. The processor looks some three hundred instructions ahead, two fours: in one go the
+/// chain of root and division would keep it waiting, in stages it works on five fours at once.
+#[inline(always)]
+fn add_fours(
+    packing: &Packing,
+    fours: &[[[u32; 2]; 4]],
+    sums: &[[f64; 4]],
+    stiffness_sum: f64,
+    net: &mut [Vec2],
+) {
+    let positions = packing.positions();
+    let sides = packing.domain().lengths();
+    let mut under_way = [Four {
+        separation: [Vec2::zeros(); 4],
+        x: [0.0; 4],
+        y: [0.0; 4],
+        distance: [0.0; 4],
+    }; UNDER_WAY];
+    // Pairs of one particle follow each other: its sum stays out of memory until they end.
+    let (mut first, mut sum_of_first) = (0, Vec2::zeros());
+    for step in 0..fours.len() + 4 * LATER {
+        if let Some(pairs) = fours.get(step) {
+            let four = &mut under_way[step % UNDER_WAY];
+            for k in 0..4 {
+                let [i, j] = pairs[k];
+                four.separation[k] = positions[i as usize] - positions[j as usize];
+            }
+        }
+        if let Some(place) = step.checked_sub(LATER) {
+            let four = &mut under_way[place % UNDER_WAY];
+            let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
+            for k in 0..4 {
+                x[k] = nearest(four.separation[k].x, sides.x);
+            }
+            for k in 0..4 {
+                y[k] = nearest(four.separation[k].y, sides.y);
+            }
+            for k in 0..4 {
+                four.distance[k] = x[k] * x[k] + y[k] * y[k];
+            }
+            (four.x, four.y) = (x, y);
+        }
+        if let Some(place) = step.checked_sub(2 * LATER) {
+            let four = &mut under_way[place % UNDER_WAY];
+            for k in 0..4 {
+                four.distance[k] = four.distance[k].sqrt();
+            }
+        }
+        if let Some(place) = step.checked_sub(3 * LATER)
+            && let Some(sums) = sums.get(place)
+        {
+            let four = &mut under_way[place % UNDER_WAY];
+            let mut factor = [0.0; 4];
+            for k in 0..4 {
+                let (sum, distance) = (sums[k], four.distance[k]);
+                let overlap = if sum > distance { sum - distance } else { 0.0 };
+                factor[k] = stiffness_sum * overlap / (sum * distance);
+            }
+            for k in 0..4 {
+                four.x[k] *= factor[k];
+            }
+            for k in 0..4 {
+                four.y[k] *= factor[k];
+            }
+        }
+        if let Some(place) = step.checked_sub(4 * LATER)
+            && let Some(pairs) = fours.get(place)
+        {
+            let four = &under_way[place % UNDER_WAY];
+            for k in 0..4 {
+                let [i, j] = pairs[k];
+                let force = Vec2::new(four.x[k], four.y[k]);
+                if i != first {
+                    net[first as usize] = sum_of_first;
+                    (first, sum_of_first) = (i, net[i as usize]);
+                }
+                sum_of_first += force;
+                net[j as usize] -= force;
+            }
+        }
+    }
+    net[first as usize] = sum_of_first;
+}
