@@ -303,7 +303,11 @@ impl Grid {
     fn ahead(&self, cell: usize) -> [(usize, usize); 4] {
         let (column, end) = (cell % self.columns, self.columns);
         let row = cell - column;
-        let above = if row + end == self.rows * end { 0 } else { row + end };
+        let above = if row + end == self.rows * end {
+            0
+        } else {
+            row + end
+        };
         let (right, across) = if column + 1 == end {
             (end, (row, row + 1))
         } else {

@@ -18,7 +18,9 @@ impl Candidates {
         self.pairs.clear();
         self.pairs.extend(pairs);
         self.sums.clear();
-        let sums = pairs.iter().map(|pair| radii[pair[0] as usize] + radii[pair[1] as usize]);
+        let sums = pairs
+            .iter()
+            .map(|pair| radii[pair[0] as usize] + radii[pair[1] as usize]);
         self.sums.extend(sums);
     }
 
@@ -45,13 +47,7 @@ impl Candidates {
 }
 
 /// Adds the forces of `pairs` to `net`, one by one.
-fn add(
-    packing: &Packing,
-    pairs: &[[u32; 2]],
-    sums: &[f64],
-    stiffness_sum: f64,
-    net: &mut [Vec2],
-) {
+fn add(packing: &Packing, pairs: &[[u32; 2]], sums: &[f64], stiffness_sum: f64, net: &mut [Vec2]) {
     for (&[i, j], sum) in pairs.iter().zip(sums) {
         let separation = packing.separation(i as usize, j as usize);
         let distance = (separation.x * separation.x + separation.y * separation.y).sqrt();
@@ -68,15 +64,6 @@ fn add(
     }
 }
 
-/// Four pairs under way.
-#[derive(Clone, Copy)]
-struct Four {
-    separation: [Vec2; 4],
-    x: [f64; 4],
-    y: [f64; 4],
-    distance: [f64; 4],
-}
-
 /// Fours under way at a time; a power of two, so that places are found by a mask.
 const UNDER_WAY: usize = 16;
 
@@ -87,7 +74,7 @@ const LATER: usize = 2;
 /// processor could guess; those that do not give zero.
 ///
 /// A four goes through five stages. The processor looks some three hundred instructions ahead, two fours: in one go the
-/// chain of root and division would keep it waiting, in stages it works on five fours at once.
+/// chain of root and division would keep it waiting, in stages it has five fours to work on.
 #[inline(always)]
 fn add_fours(
     packing: &Packing,
@@ -98,66 +85,31 @@ fn add_fours(
 ) {
     let positions = packing.positions();
     let sides = packing.domain().lengths();
-    let mut under_way = [Four {
-        separation: [Vec2::zeros(); 4],
-        x: [0.0; 4],
-        y: [0.0; 4],
-        distance: [0.0; 4],
-    }; UNDER_WAY];
+    let mut under_way = [Four::default(); UNDER_WAY];
     // Pairs of one particle follow each other: its sum stays out of memory until they end.
     let (mut first, mut sum_of_first) = (0, Vec2::zeros());
     for step in 0..fours.len() + 4 * LATER {
+        let place = |stage: usize| step.checked_sub(stage * LATER);
         if let Some(pairs) = fours.get(step) {
-            let four = &mut under_way[step % UNDER_WAY];
-            for k in 0..4 {
-                let [i, j] = pairs[k];
-                four.separation[k] = positions[i as usize] - positions[j as usize];
-            }
+            under_way[step % UNDER_WAY].separate(positions, pairs);
         }
-        if let Some(place) = step.checked_sub(LATER) {
-            let four = &mut under_way[place % UNDER_WAY];
-            let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
-            for k in 0..4 {
-                x[k] = nearest(four.separation[k].x, sides.x);
-            }
-            for k in 0..4 {
-                y[k] = nearest(four.separation[k].y, sides.y);
-            }
-            for k in 0..4 {
-                four.distance[k] = x[k] * x[k] + y[k] * y[k];
-            }
-            (four.x, four.y) = (x, y);
+        if let Some(place) = place(1) {
+            under_way[place % UNDER_WAY].take_nearest_images(sides);
         }
-        if let Some(place) = step.checked_sub(2 * LATER) {
-            let four = &mut under_way[place % UNDER_WAY];
-            for k in 0..4 {
-                four.distance[k] = four.distance[k].sqrt();
-            }
+        if let Some(place) = place(2) {
+            under_way[place % UNDER_WAY].take_roots();
         }
-        if let Some(place) = step.checked_sub(3 * LATER)
+        if let Some(place) = place(3)
             && let Some(sums) = sums.get(place)
         {
-            let four = &mut under_way[place % UNDER_WAY];
-            let mut factor = [0.0; 4];
-            for k in 0..4 {
-                let (sum, distance) = (sums[k], four.distance[k]);
-                let overlap = if sum > distance { sum - distance } else { 0.0 };
-                factor[k] = stiffness_sum * overlap / (sum * distance);
-            }
-            for k in 0..4 {
-                four.x[k] *= factor[k];
-            }
-            for k in 0..4 {
-                four.y[k] *= factor[k];
-            }
+            under_way[place % UNDER_WAY].push(sums, stiffness_sum);
         }
-        if let Some(place) = step.checked_sub(4 * LATER)
+        if let Some(place) = place(4)
             && let Some(pairs) = fours.get(place)
         {
-            let four = &under_way[place % UNDER_WAY];
-            for k in 0..4 {
-                let [i, j] = pairs[k];
-                let force = Vec2::new(four.x[k], four.y[k]);
+            let Four { x, y, .. } = &under_way[place % UNDER_WAY];
+            for ((&[i, j], &x), &y) in pairs.iter().zip(x).zip(y) {
+                let force = Vec2::new(x, y);
                 if i != first {
                     net[first as usize] = sum_of_first;
                     (first, sum_of_first) = (i, net[i as usize]);
@@ -168,4 +120,65 @@ fn add_fours(
         }
     }
     net[first as usize] = sum_of_first;
+}
+
+/// Four pairs under way. One simple loop a quantity, so that each is done for all four at once.
+#[derive(Clone, Copy, Default)]
+struct Four {
+    separation: [Vec2; 4],
+    /// Components of the separation, then of the force.
+    x: [f64; 4],
+    y: [f64; 4],
+    /// The distance, and its square before.
+    distance: [f64; 4],
+}
+
+impl Four {
+    #[inline(always)]
+    fn separate(&mut self, positions: &[Vec2], pairs: &[[u32; 2]; 4]) {
+        for (separation, &[i, j]) in self.separation.iter_mut().zip(pairs) {
+            *separation = positions[i as usize] - positions[j as usize];
+        }
+    }
+
+    #[inline(always)]
+    fn take_nearest_images(&mut self, sides: Vec2) {
+        let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
+        for k in 0..4 {
+            x[k] = nearest(self.separation[k].x, sides.x);
+            y[k] = nearest(self.separation[k].y, sides.y);
+        }
+        for k in 0..4 {
+            self.distance[k] = x[k] * x[k] + y[k] * y[k];
+        }
+        (self.x, self.y) = (x, y);
+    }
+
+    #[inline(always)]
+    fn take_roots(&mut self) {
+        for distance in &mut self.distance {
+            *distance = distance.sqrt();
+        }
+    }
+
+    /// `n f = (r/|r|) k δ`.
+    #[inline(always)]
+    fn push(&mut self, sums: &[f64; 4], stiffness_sum: f64) {
+        let Self { x, y, distance, .. } = self;
+        let mut factor = [0.0; 4];
+        for k in 0..4 {
+            let overlap = if sums[k] > distance[k] {
+                sums[k] - distance[k]
+            } else {
+                0.0
+            };
+            factor[k] = stiffness_sum * overlap / (sums[k] * distance[k]);
+        }
+        for k in 0..4 {
+            x[k] *= factor[k];
+        }
+        for k in 0..4 {
+            y[k] *= factor[k];
+        }
+    }
 }

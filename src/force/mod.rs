@@ -110,16 +110,22 @@ pub type Metrics = [f64; METRICS.len()];
 /// ```
 pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
     net.fill(Vec2::zeros());
-    for ((&[i, j], n), &f) in contacts
-        .pairs
-        .iter()
-        .zip(contacts.normals)
-        .zip(contacts.forces)
-    {
+    let forces = contacts.normals.iter().zip(contacts.forces);
+    let Some(&[mut first, _]) = contacts.pairs.first() else {
+        return;
+    };
+    // Contacts of one particle follow each other: its sum stays out of memory until they end.
+    let mut sum_of_first = Vec2::zeros();
+    for (&[i, j], (n, &f)) in contacts.pairs.iter().zip(forces) {
         let force = n * f;
-        net[i as usize] += force;
+        if i != first {
+            net[first as usize] = sum_of_first;
+            (first, sum_of_first) = (i, net[i as usize]);
+        }
+        sum_of_first += force;
         net[j as usize] -= force;
     }
+    net[first as usize] = sum_of_first;
 }
 
 /// `f_max`, the largest magnitude of a net force (force): the seed's measure of equilibrium, Saitoh 2.4.
