@@ -182,3 +182,36 @@ impl Four {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::Domain;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Fours and single pairs are two ways of the same operations.
+        #[test]
+        fn four_pairs_at_a_time_give_the_bits_of_one_pair_at_a_time(
+            points in prop::collection::vec((0.0..1.0f64, 0.0..1.0f64), 2..60),
+            together in any::<bool>(),
+        ) {
+            let mut points: Vec<_> = points.iter().map(|p| Vec2::new(5.0 * p.0, 4.0 * p.1)).collect();
+            if together {
+                points[1] = points[0];
+            }
+            let radii = (0..points.len()).map(|i| 0.3 + 0.02 * (i % 7) as f64).collect();
+            let packing = Packing::new(Domain::new(5.0, 4.0).unwrap(), radii, points).unwrap();
+            let n = packing.len() as u32;
+            let pairs: Vec<_> = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).collect();
+            let mut candidates = Candidates::default();
+            candidates.renew(packing.radii(), &pairs);
+            let (mut net, mut expected) = (vec![Vec2::zeros(); n as usize], vec![Vec2::zeros(); n as usize]);
+            let largest = candidates.forces(&packing, 0.7, &mut net);
+            add(&packing, &pairs, &candidates.sums, 4.0 * PI * 0.7 / 3.0, &mut expected);
+            prop_assert!(largest.is_finite());
+            prop_assert_eq!(largest, largest_force(&expected));
+            prop_assert_eq!(net, expected);
+        }
+    }
+}

@@ -208,8 +208,9 @@ impl Fire {
     /// let mut state = FireState::start(&fire, 0.5);
     /// let home = Vec2::new(5.0, 5.0);
     /// for _ in 0..300 {
-    ///     let force = [home - x[0]];
-    ///     fire.advance(&mut state, &force, &mut v, &mut x, domain);
+    ///     let (before, force) = (x[0], [home - x[0]]);
+    ///     let moved = fire.advance(&mut state, &force, &mut v, &mut x, domain);
+    ///     assert!((x[0] - before).norm() <= moved + 1e-14);
     /// }
     /// assert!((x[0] - home).norm() < 1e-10);
     /// ```
