@@ -4,8 +4,9 @@
 //! distances, and the pairs come in ascending order, so neither the age nor the reach of the list can reach a result:
 //! a replay that starts with a fresh list walks the same bits.
 
-use crate::domain::{Domain, Vec2};
+use crate::domain::{Domain, Vec2, nearest};
 use crate::packing::Packing;
+use crate::wide::wide;
 
 /// All pairs `i < j` whose undeformed surfaces were closer than `reach` when the list was built, ascending.
 ///
@@ -140,65 +141,131 @@ impl NeighborList {
 /// Particles sorted into cells at least as wide as the longest distance asked for: O(N) to fill and to search.
 #[derive(Clone, Debug, Default)]
 struct CellList {
-    /// The particles of cell c are `particle[first[c]..first[c + 1]]`, ascending.
+    /// The particles in their own order, and in that of their cells.
+    particles: Vec<Seat>,
+    seats: Vec<Seat>,
+    /// Cell c has `seats[first[c]..first[c + 1]]`.
     first: Vec<u32>,
-    particle: Vec<u32>,
-    cell_of: Vec<u32>,
+    /// Pairs in the order in which the cells give them, and in that of their second particles.
+    found: Vec<[u32; 2]>,
+    by_second: Vec<[u32; 2]>,
+    slots: Vec<u32>,
+}
+
+/// A particle in a cell, with what its distances take.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seat {
+    at: Vec2,
+    radius: f64,
+    particle: u32,
+    cell: u32,
 }
 
 impl CellList {
     fn pairs_within(&mut self, packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
-        pairs.clear();
         let longest = 2.0 * packing.largest_radius() + reach;
-        let near = |i: u32, j: u32| {
-            let (i, j) = (i as usize, j as usize);
-            let sum = packing.radii()[i] + packing.radii()[j] + reach;
-            packing.separation(i, j).norm_squared() < sum * sum
-        };
-        let n = packing.len() as u32;
-        let Some(grid) = Grid::new(packing.domain(), longest, packing.len()) else {
+        let n = packing.len();
+        let Some(grid) = Grid::new(packing.domain(), longest, n) else {
             // Fewer than three cells along a side: every pair is a neighbour pair of cells anyway.
-            for i in 0..n {
-                pairs.extend((i + 1..n).filter(|&j| near(i, j)).map(|j| [i, j]));
+            let near = |i: u32, j: u32| {
+                let (i, j) = (i as usize, j as usize);
+                let sum = packing.radii()[i] + packing.radii()[j] + reach;
+                packing.separation(i, j).norm_squared() < sum * sum
+            };
+            pairs.clear();
+            for i in 0..n as u32 {
+                pairs.extend((i + 1..n as u32).filter(|&j| near(i, j)).map(|j| [i, j]));
             }
             return;
         };
-        self.fill(packing.positions(), grid);
-        for i in 0..n {
-            let start = pairs.len();
-            for cell in grid.around(self.cell_of[i as usize]) {
-                let (a, b) = (self.first[cell] as usize, self.first[cell + 1] as usize);
-                pairs.extend(
-                    self.particle[a..b]
-                        .iter()
-                        .filter(|&&j| j > i && near(i, j))
-                        .map(|&j| [i, j]),
-                );
-            }
-            pairs[start..].sort_unstable();
-        }
+        self.fill(packing, grid);
+        let count = wide(
+            #[inline(always)]
+            || self.search(packing.domain(), reach, grid),
+        );
+        let (found, slots) = (&self.found[..count], &mut self.slots);
+        sort_by_number(found, &mut self.by_second, slots, n, |pair| pair[1]);
+        sort_by_number(&self.by_second, pairs, slots, n, |pair| pair[0]);
     }
 
-    /// Counting sort of the particles by cell.
-    fn fill(&mut self, positions: &[Vec2], grid: Grid) {
-        self.first.clear();
-        self.first.resize(grid.columns * grid.rows + 1, 0);
-        self.cell_of.clear();
-        self.cell_of.extend(positions.iter().map(|&p| grid.cell(p)));
-        for &c in &self.cell_of {
-            self.first[c as usize + 1] += 1;
+    fn fill(&mut self, packing: &Packing, grid: Grid) {
+        let places = packing.positions().iter().zip(packing.radii());
+        self.particles.clear();
+        self.particles
+            .extend((0..).zip(places).map(|(particle, (&at, &radius))| Seat {
+                at,
+                radius,
+                particle,
+                cell: grid.cell(at),
+            }));
+        let cells = grid.columns * grid.rows;
+        let (seats, first) = (&mut self.seats, &mut self.first);
+        sort_by_number(&self.particles, seats, first, cells, |seat| seat.cell);
+    }
+
+    /// Looks once at each two particles of neighbouring cells; says how many pairs were found.
+    #[inline(always)]
+    fn search(&mut self, domain: Domain, reach: f64, grid: Grid) -> usize {
+        let sides = domain.lengths();
+        let mut count = 0;
+        for cell in 0..grid.columns * grid.rows {
+            let mut ahead = grid
+                .ahead(cell)
+                .map(|(from, to)| self.first[from] as usize..self.first[to] as usize);
+            let here = self.first[cell] as usize..self.first[cell + 1] as usize;
+            let most: usize = ahead.iter().map(ExactSizeIterator::len).sum();
+            if self.found.len() < count + here.len() * most {
+                self.found.resize(count + here.len() * most, [0; 2]);
+            }
+            for k in here {
+                let seat = self.seats[k];
+                ahead[0].start = k + 1;
+                for others in &ahead {
+                    let others = &self.seats[others.clone()];
+                    let slots = &mut self.found[count..][..others.len()];
+                    let mut near = 0;
+                    // Without a branch: nobody could guess who is near.
+                    for other in others {
+                        let x = nearest(seat.at.x - other.at.x, sides.x);
+                        let y = nearest(seat.at.y - other.at.y, sides.y);
+                        let sum = seat.radius + other.radius + reach;
+                        let (i, j) = (seat.particle, other.particle);
+                        slots[near] = [i.min(j), i.max(j)];
+                        near += usize::from(x * x + y * y < sum * sum);
+                    }
+                    count += near;
+                }
+            }
         }
-        for c in 1..self.first.len() {
-            self.first[c] += self.first[c - 1];
-        }
-        self.particle.clear();
-        self.particle.resize(positions.len(), 0);
-        let mut next = self.first.clone();
-        for (i, &c) in self.cell_of.iter().enumerate() {
-            let slot = &mut next[c as usize];
-            self.particle[*slot as usize] = i as u32;
-            *slot += 1;
-        }
+        count
+    }
+}
+
+/// Counting sort of `items` into `sorted` by a number below `numbers`; equal ones keep their order. Those of number c
+/// become `sorted[first[c]..first[c + 1]]`.
+fn sort_by_number<T: Copy + Default>(
+    items: &[T],
+    sorted: &mut Vec<T>,
+    first: &mut Vec<u32>,
+    numbers: usize,
+    number: impl Fn(&T) -> u32,
+) {
+    first.clear();
+    first.resize(numbers + 1, 0);
+    for item in items {
+        first[number(item) as usize] += 1;
+    }
+    // Where each number ends; filling backwards turns that into where it begins.
+    let mut end = 0;
+    for count in &mut *first {
+        end += *count;
+        *count = end;
+    }
+    sorted.resize(items.len(), T::default());
+    for item in items.iter().rev() {
+        let slot = &mut first[number(item) as usize];
+        *slot -= 1;
+        sorted[*slot as usize] = *item;
     }
 }
 
@@ -230,17 +297,31 @@ impl Grid {
         (row * self.columns + column) as u32
     }
 
-    /// The nine cells around one, itself included.
-    fn around(&self, cell: u32) -> [usize; 9] {
-        let (column, row) = (cell as usize % self.columns, cell as usize / self.columns);
-        let near = |x: usize, n: usize| [(x + n - 1) % n, x, (x + 1) % n];
-        let mut cells = [0; 9];
-        for (a, r) in near(row, self.rows).into_iter().enumerate() {
-            for (b, c) in near(column, self.columns).into_iter().enumerate() {
-                cells[3 * a + b] = r * self.columns + c;
-            }
-        }
-        cells
+    /// A cell, the one to its right and the three above it, as stretches of cells of a row: the first begins with the
+    /// cell itself, and what lies across the edge makes stretches of its own.
+    #[inline(always)]
+    fn ahead(&self, cell: usize) -> [(usize, usize); 4] {
+        let (column, end) = (cell % self.columns, self.columns);
+        let row = cell - column;
+        let above = if row + end == self.rows * end {
+            0
+        } else {
+            row + end
+        };
+        let (right, across) = if column + 1 == end {
+            (end, (row, row + 1))
+        } else {
+            (column + 2, (row, row))
+        };
+        let (three, beyond) = if column == 0 {
+            ((0, 2), (end - 1, end))
+        } else if column + 1 == end {
+            ((end - 2, end), (0, 1))
+        } else {
+            ((column - 1, column + 2), (0, 0))
+        };
+        let raised = |(from, to)| (above + from, above + to);
+        [(cell, row + right), across, raised(three), raised(beyond)]
     }
 }
 

@@ -110,16 +110,22 @@ pub type Metrics = [f64; METRICS.len()];
 /// ```
 pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
     net.fill(Vec2::zeros());
-    for ((&[i, j], n), &f) in contacts
-        .pairs
-        .iter()
-        .zip(contacts.normals)
-        .zip(contacts.forces)
-    {
+    let forces = contacts.normals.iter().zip(contacts.forces);
+    let Some(&[mut first, _]) = contacts.pairs.first() else {
+        return;
+    };
+    // Contacts of one particle follow each other: its sum stays out of memory until they end.
+    let mut sum_of_first = Vec2::zeros();
+    for (&[i, j], (n, &f)) in contacts.pairs.iter().zip(forces) {
         let force = n * f;
-        net[i as usize] += force;
+        if i != first {
+            net[first as usize] = sum_of_first;
+            (first, sum_of_first) = (i, net[i as usize]);
+        }
+        sum_of_first += force;
         net[j as usize] -= force;
     }
+    net[first as usize] = sum_of_first;
 }
 
 /// `f_max`, the largest magnitude of a net force (force): the seed's measure of equilibrium, Saitoh 2.4.
@@ -129,26 +135,31 @@ pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
 /// ```
 /// use softjam::{domain::Vec2, force::largest_force};
 /// assert_eq!(largest_force(&[Vec2::new(3.0, 4.0), Vec2::new(1.0, 0.0)]), 5.0);
+/// assert!(largest_force(&[Vec2::new(f64::NAN, 4.0), Vec2::new(1.0, 0.0)]).is_nan());
 /// ```
 #[must_use]
 pub fn largest_force(net: &[Vec2]) -> f64 {
     let (net4, rest) = net.as_chunks::<4>();
-    // A NaN must not hide behind a comparison.
-    let larger = |m: f64, s: f64| if s <= m { m } else { s };
-    let mut most = [0.0; 4];
-    wide(
+    let larger = |m: f64, s: f64| if s > m { s } else { m };
+    let (most, sums) = wide(
         #[inline(always)]
         || {
+            // A NaN hides behind comparisons, not behind a sum.
+            let (mut most, mut sums) = ([0.0; 4], [0.0; 4]);
             for f in net4 {
                 for k in 0..4 {
-                    most[k] = larger(most[k], f[k].norm_squared());
+                    let squared = f[k].x * f[k].x + f[k].y * f[k].y;
+                    most[k] = larger(most[k], squared);
+                    sums[k] += squared;
                 }
             }
+            (most, sums)
         },
     );
-    let squared = most.into_iter().fold(0.0, larger);
-    let squared = rest.iter().map(Vec2::norm_squared).fold(squared, larger);
-    squared.sqrt()
+    let rest = rest.iter().map(Vec2::norm_squared);
+    let sum: f64 = sums.into_iter().chain(rest.clone()).sum();
+    let most = most.into_iter().chain(rest).fold(0.0, larger);
+    if sum.is_nan() { sum } else { most.sqrt() }
 }
 
 /// What a frame is worth in numbers, all in units of the line tension γ: they do not depend on its value.

@@ -192,7 +192,8 @@ impl FireState {
 impl Fire {
     /// One move: changes state, velocities and positions; the positions end wrapped into `domain`.
     ///
-    /// All slices have one entry a particle. Velocities start from zero.
+    /// All slices have one entry a particle. Velocities start from zero. What is returned is no less than the distance
+    /// (length) by which any particle has moved, at most √2 times as much; infinite after a step back, or if a velocity is no number.
     ///
     /// # Example
     ///
@@ -207,8 +208,9 @@ impl Fire {
     /// let mut state = FireState::start(&fire, 0.5);
     /// let home = Vec2::new(5.0, 5.0);
     /// for _ in 0..300 {
-    ///     let force = [home - x[0]];
-    ///     fire.advance(&mut state, &force, &mut v, &mut x, domain);
+    ///     let (before, force) = (x[0], [home - x[0]]);
+    ///     let moved = fire.advance(&mut state, &force, &mut v, &mut x, domain);
+    ///     assert!((x[0] - before).norm() <= moved + 1e-14);
     /// }
     /// assert!((x[0] - home).norm() < 1e-10);
     /// ```
@@ -219,11 +221,11 @@ impl Fire {
         velocities: &mut [Vec2],
         positions: &mut [Vec2],
         domain: Domain,
-    ) {
+    ) -> f64 {
         wide(
             #[inline(always)]
             || self.advance_here(state, forces, velocities, positions, domain),
-        );
+        )
     }
 
     #[inline(always)]
@@ -234,7 +236,7 @@ impl Fire {
         velocities: &mut [Vec2],
         positions: &mut [Vec2],
         domain: Domain,
-    ) {
+    ) -> f64 {
         let power = power(forces, velocities);
         let mut back = 0.0;
         if power > 0.0 {
@@ -272,12 +274,73 @@ impl Fire {
             0.0
         };
         let keep = 1.0 - state.alpha;
-        for ((x, v), f) in positions.iter_mut().zip(&mut *velocities).zip(forces) {
+        let dt = state.dt;
+        let mut reached = Reached::default();
+        let (x2, x_rest) = positions.as_chunks_mut::<2>();
+        let (v2, v_rest) = velocities.as_chunks_mut::<2>();
+        let (f2, f_rest) = forces.as_chunks::<2>();
+        for ((x, v), f) in x2.iter_mut().zip(v2).zip(f2) {
+            for k in 0..2 {
+                v[k] = v[k] * keep + f[k] * towards;
+                x[k] += v[k] * dt;
+            }
+            reached.add(x, v);
+        }
+        for ((x, v), f) in x_rest.iter_mut().zip(v_rest).zip(f_rest) {
             *v = *v * keep + f * towards;
-            *x = domain.wrap(*x + *v * state.dt);
+            *x += *v * dt;
+            reached.add(&[*x; 2], &[*v; 2]);
+        }
+        let numbers = (vv + ff).is_finite();
+        if !(numbers && reached.within(domain)) {
+            for x in positions {
+                *x = domain.wrap(*x);
+            }
         }
         state.moves = state.moves.saturating_add(1);
-        state.time += state.dt;
+        state.time += dt;
+        if back == 0.0 && numbers {
+            // Something for the rounding.
+            reached.speed() * dt * (1.0 + 1e-12)
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// The extremes of coordinates and of the components of velocities, two particles at a time. A NaN is passed over.
+#[derive(Default)]
+struct Reached {
+    lowest: [Vec2; 2],
+    highest: [Vec2; 2],
+    fastest: [Vec2; 2],
+}
+
+impl Reached {
+    #[inline(always)]
+    fn add(&mut self, positions: &[Vec2; 2], velocities: &[Vec2; 2]) {
+        let lower = |m: f64, x: f64| if x < m { x } else { m };
+        let higher = |m: f64, x: f64| if x > m { x } else { m };
+        for k in 0..2 {
+            let (m, x) = (&mut self.lowest[k], positions[k]);
+            *m = Vec2::new(lower(m.x, x.x), lower(m.y, x.y));
+            let m = &mut self.highest[k];
+            *m = Vec2::new(higher(m.x, x.x), higher(m.y, x.y));
+            let (m, v) = (&mut self.fastest[k], velocities[k]);
+            *m = Vec2::new(higher(m.x, v.x.abs()), higher(m.y, v.y.abs()));
+        }
+    }
+
+    /// Whether all positions lie in the box.
+    fn within(&self, domain: Domain) -> bool {
+        let lowest = self.lowest[0].inf(&self.lowest[1]).min();
+        let highest = self.highest[0].sup(&self.highest[1]);
+        lowest >= 0.0 && highest.x < domain.lengths().x && highest.y < domain.lengths().y
+    }
+
+    /// A speed that no particle exceeds, at most √2 times the largest.
+    fn speed(&self) -> f64 {
+        self.fastest[0].sup(&self.fastest[1]).norm()
     }
 }
 
@@ -293,6 +356,12 @@ fn power(forces: &[Vec2], velocities: &[Vec2]) -> f64 {
         }
     }
     let rest: f64 = f_rest.iter().zip(v_rest).map(|(f, v)| f.dot(v)).sum();
+    total(&sums) + rest
+}
+
+/// Not inlined: the compiler would arrange the loop before for what is done once behind it.
+#[inline(never)]
+fn total(sums: &[Vec2; 4]) -> f64 {
     let [a, b, c, d] = sums.map(|s| s.x + s.y);
-    (a + b) + (c + d) + rest
+    (a + b) + (c + d)
 }

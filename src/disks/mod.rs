@@ -4,13 +4,15 @@
 //! on its own, so that both stages share their units. FIRE relaxes them from zero velocity. Work and memory are O(N) a
 //! step, by a Verlet list from a cell list.
 
-use crate::domain::{Vec2, nearest};
-use crate::force::{backbone, largest_force, mean_coordination};
+mod forces;
+
+use crate::domain::Vec2;
+use crate::force::{backbone, mean_coordination};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 use crate::relax::fire::{Fire, FireState};
-use crate::wide::wide;
 use core::f64::consts::PI;
+use forces::Candidates;
 
 /// When the relaxation of the disks ends.
 ///
@@ -71,20 +73,20 @@ pub struct DiskReport {
 pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f64) -> DiskReport {
     let fire = Fire::default();
     let mut neighbors = NeighborList::new();
+    let mut candidates = Candidates::default();
     let mut velocities = vec![Vec2::zeros(); packing.len()];
     let mut net = vec![Vec2::zeros(); packing.len()];
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
-    let skin = SKIN * packing.largest_radius();
+    let radius = packing.largest_radius();
+    let mut skin = SKIN[1] * radius;
     let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
-        neighbors.update_after(packing, 0.0, skin, moved);
-        wide(
-            #[inline(always)]
-            || disk_forces(packing, neighbors.pairs(), line_tension, &mut net),
-        );
-        let f_max = largest_force(&net) / line_tension;
+        if neighbors.update_after(packing, 0.0, skin, moved) {
+            candidates.renew(packing.radii(), neighbors.pairs());
+        }
+        let f_max = candidates.forces(packing, line_tension, &mut net) / line_tension;
         let converged = f_max <= parameters.threshold;
         if converged || step >= parameters.steps {
             let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
@@ -96,19 +98,17 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
                 rattlers,
             };
         }
-        fire.advance(
+        moved = fire.advance(
             &mut state,
             &net,
             &mut velocities,
             packing.positions_mut(),
             domain,
         );
-        // A step uphill goes back first.
-        moved = if state.downhill > 0 {
-            state.dt * largest_force(&velocities)
-        } else {
-            f64::INFINITY
-        };
+        if moved.is_finite() {
+            skin = (12.0 * moved * radius).sqrt();
+            skin = skin.clamp(SKIN[0] * radius, SKIN[1] * radius);
+        }
         step += 1;
     }
 }
@@ -118,63 +118,11 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
 /// 1e-6 at N = 1024, φ = 0.86: 4484 with 0.41 and 4589 with 0.5 (18 seeds); from 0.65 on several times as many.
 const DT_MAX: f64 = 0.41;
 
-/// How far the neighbour list reaches beyond the disks, in units of the largest radius.
-const SKIN: f64 = 0.3;
-
-/// Pairs that are computed together: their numbers stay in the fastest memory.
-const LANES: usize = 128;
-
-/// Net forces of the disks into `net`, from candidates that ascend.
+/// How far the neighbour list reaches beyond the disks at least and at most, in units of the largest radius `R`.
 ///
-/// In three passes over a bunch of pairs: separations from scattered positions, forces by columns and without a branch
-/// (which of the candidates touch is nothing that a processor could guess; those that do not give zero), and their sums in
-/// the order of the candidates.
-#[inline(always)]
-fn disk_forces(packing: &Packing, candidates: &[[u32; 2]], line_tension: f64, net: &mut [Vec2]) {
-    net.fill(Vec2::zeros());
-    let (positions, radii) = (packing.positions(), packing.radii());
-    let sides = packing.domain().lengths();
-    let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
-    let (mut x, mut y, mut sum) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
-    let mut distance = [0.0; LANES];
-    for pairs in candidates.chunks(LANES) {
-        let columns = x.iter_mut().zip(&mut y).zip(&mut sum);
-        for (&[i, j], ((x, y), sum)) in pairs.iter().zip(columns) {
-            let difference = positions[i as usize] - positions[j as usize];
-            (*x, *y) = (difference.x, difference.y);
-            *sum = radii[i as usize] + radii[j as usize];
-        }
-        // One simple loop a quantity, so that each is done several pairs at a time.
-        for x in &mut x {
-            *x = nearest(*x, sides.x);
-        }
-        for y in &mut y {
-            *y = nearest(*y, sides.y);
-        }
-        for k in 0..LANES {
-            distance[k] = (x[k] * x[k] + y[k] * y[k]).sqrt();
-        }
-        for k in 0..LANES {
-            // n f = (r/|r|) k δ
-            let factor = stiffness_sum * (sum[k] - distance[k]) / (sum[k] * distance[k]);
-            let touching = distance[k] < sum[k];
-            let factor = if touching { factor } else { 0.0 };
-            x[k] *= factor;
-            y[k] *= factor;
-        }
-        if distance.contains(&0.0) {
-            // Coincident centres are told apart along x, as in `unit_and_length`.
-            for k in (0..LANES).filter(|k| distance[*k] == 0.0) {
-                (x[k], y[k]) = (stiffness_sum, 0.0);
-            }
-        }
-        for (&[i, j], (x, y)) in pairs.iter().zip(x.iter().zip(&y)) {
-            let force = Vec2::new(*x, *y);
-            net[i as usize] += force;
-            net[j as usize] -= force;
-        }
-    }
-}
+/// A skin `s` lasts `s/2v` steps at `v` a step. A list costs as much as some eight pairs a particle, and holds some 1.2 `s/R`
+/// pairs a particle in vain: both together cost least near `s = √(12 v R)`.
+const SKIN: [f64; 2] = [0.05, 0.8];
 
 /// The pairs of disks that overlap.
 fn touching(packing: &Packing, neighbors: &NeighborList) -> Vec<[u32; 2]> {
