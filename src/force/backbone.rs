@@ -286,9 +286,13 @@ mod tests {
         let old: Vec<_> = all.iter().copied().filter(|p| p[1] % 17 != 3).collect();
         let new: Vec<_> = all.iter().copied().filter(|p| p[1] % 23 != 5).collect();
         let (mut gone, mut came) = (Vec::new(), Vec::new());
-        differences(&old, &new, |[_, j], new| {
-            if new { came.push(j) } else { gone.push(j) }
-        });
+        differences(
+            &old,
+            &new,
+            |[_, j], new| {
+                if new { came.push(j) } else { gone.push(j) }
+            },
+        );
         assert_eq!(came, [3, 20, 37, 54, 71, 88]);
         assert_eq!(gone, [5, 28, 51, 74, 97]);
         differences(&new, &new, |_, _| panic!("the same"));

@@ -382,10 +382,7 @@ impl Sums {
             }
         }
         for (k, &f) in last_forces.iter().enumerate() {
-            sums.add(
-                k,
-                (f, last_normals[k], last_distances[k], last_overlaps[k]),
-            );
+            sums.add(k, (f, last_normals[k], last_distances[k], last_overlaps[k]));
         }
         sums
     }

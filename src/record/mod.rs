@@ -24,6 +24,7 @@ mod encode;
 mod header;
 mod hover;
 mod images;
+mod ipc;
 mod legend;
 mod live;
 mod mcap;

@@ -43,7 +43,7 @@ use std::io::{self, Write};
 
 /// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
 /// is killed loses no more than a batch.
-const BATCH_BYTES: usize = 1 << 21;
+const BATCH_BYTES: usize = 1 << 24;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 
