@@ -25,7 +25,7 @@
 use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
 use super::hover::{ContactRows, ParticleRows};
-use super::images::{ImageRows, shifts_of_polygon, shifts_of_segment};
+use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
 use super::pictures::{Network, Particles};
 use super::states::StateRows;
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
@@ -174,17 +174,18 @@ impl<W: Write> RrdRecorder<W> {
         } = &mut self.pending;
         let line_tension = self.line_tension;
         let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
-        let vertices = contours.contours(drawing, |p, polygon, deepest| {
-            let color = seen.color(p);
-            shifts_of_polygon(domain, polygon, |shift| {
-                images.image(polygon, shift, color, p);
-            });
+        let vertices = contours.contours(drawing, |p, polygon, extent| {
+            let (color, centre) = (seen.color(p), frame.positions[p]);
+            if !is_within(domain, centre, extent.reach) {
+                shifts_of_polygon(domain, polygon, |shift| {
+                    images.image(polygon, shift, color, p);
+                });
+            }
             particles.particle(
-                &seen,
-                frame.positions[p],
-                deepest / radii[p],
+                (&seen, p),
+                (centre, color),
+                extent.deepest / radii[p],
                 line_tension,
-                p,
             );
             color
         });
