@@ -30,6 +30,8 @@ mod live;
 mod mcap;
 pub(crate) mod messages;
 mod pictures;
+mod pipeline;
+mod rows;
 mod rrd;
 mod scene_update;
 mod sink;
