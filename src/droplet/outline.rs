@@ -12,27 +12,23 @@ const LANES: usize = 8;
 #[derive(Clone, Debug)]
 pub(crate) struct Circle {
     pub directions: Vec<Direction>,
-    /// Their cosines, sines and angles, with so many behind them that [`LANES`] can be read at each.
-    single: [Vec<f32>; 3],
+    /// [`LANES`] cosines, sines and angles from each direction on; behind the last they are 0.
+    single: Vec<[[f32; LANES]; 3]>,
     /// The angles between −∞ and twice ∞.
     angles: Vec<f64>,
 }
 
 impl Circle {
     pub fn of(directions: Vec<Direction>) -> Self {
-        let column = |of: fn(&Direction) -> f64| {
-            let behind = core::iter::repeat_n(0.0, LANES);
-            directions.iter().map(move |d| of(d) as f32).chain(behind)
+        let from = |k: usize, of: fn(&Direction) -> f64| {
+            core::array::from_fn(|n| directions.get(k + n).map_or(0.0, of) as f32)
         };
+        let from = |k| [from(k, |d| d.cos), from(k, |d| d.sin), from(k, |d| d.angle)];
         let angles = directions.iter().map(|d| d.angle);
         let below = core::iter::once(f64::NEG_INFINITY);
         Self {
             angles: below.chain(angles).chain([f64::INFINITY; 2]).collect(),
-            single: [
-                column(|d| d.cos).collect(),
-                column(|d| d.sin).collect(),
-                column(|d| d.angle).collect(),
-            ],
+            single: (0..directions.len()).map(from).collect(),
             directions,
         }
     }
@@ -76,21 +72,33 @@ impl Vertex for [f32; 2] {
 
 /// Vertices with a way of their own to draw the part of a contour between two contacts.
 pub(crate) trait Stretch: Vertex {
+    /// What all parts of a contour have in common.
+    type Pen: Copy;
+
+    fn pen(sector: &Sector) -> Self::Pen;
+
     /// Appends the vertices of `sector` in the directions `range` of `circle`.
     fn stretch(
         circle: &Circle,
         range: core::ops::Range<usize>,
         sector: &Sector,
+        pen: Self::Pen,
         vertices: &mut Vec<Self>,
     );
 }
 
 impl Stretch for Vec2 {
+    type Pen = ();
+
+    #[inline(always)]
+    fn pen(_: &Sector) -> Self::Pen {}
+
     #[inline(always)]
     fn stretch(
         circle: &Circle,
         range: core::ops::Range<usize>,
         sector: &Sector,
+        (): Self::Pen,
         vertices: &mut Vec<Self>,
     ) {
         let directions = circle.directions[range].iter();
@@ -98,29 +106,56 @@ impl Stretch for Vec2 {
     }
 }
 
-/// Off `ρ(θ)` by the rounding of the sum at most, and as much again of `ρ` itself.
+/// A sector's centre, radius, `S_c` and `S_s`, and what single precision leaves of the centre.
+#[derive(Clone, Copy)]
+pub(crate) struct SinglePen {
+    centre: [f32; 2],
+    rest: [f32; 2],
+    radius: f32,
+    s_c: f32,
+    s_s: f32,
+}
+
+/// `ρ` is off by some roundings of its own size, the vertex by one rounding of its place besides.
 impl Stretch for [f32; 2] {
+    type Pen = SinglePen;
+
+    #[inline(always)]
+    fn pen(sector: &Sector) -> Self::Pen {
+        let centre = [sector.centre.x, sector.centre.y];
+        SinglePen {
+            centre: centre.map(|x| x as f32),
+            rest: centre.map(|x| (x - f64::from(x as f32)) as f32),
+            radius: sector.radius as f32,
+            s_c: sector.s_c as f32,
+            s_s: sector.s_s as f32,
+        }
+    }
+
     #[inline(always)]
     fn stretch(
         circle: &Circle,
         range: core::ops::Range<usize>,
         sector: &Sector,
+        pen: Self::Pen,
         vertices: &mut Vec<Self>,
     ) {
-        let narrow = |x: f64| (x as f32, (x - f64::from(x as f32)) as f32);
-        let ((x, x_rest), (y, y_rest)) = (narrow(sector.centre.x), narrow(sector.centre.y));
-        let (radius, p, q) = (sector.radius as f32, sector.p as f32, sector.q as f32);
-        let (s_c, s_s) = (sector.s_c as f32, sector.s_s as f32);
+        let (p, q) = (sector.p as f32, sector.q as f32);
         let length = vertices.len() + range.len();
-        for k in range.step_by(LANES) {
-            let [cos, sin, angle] = [0, 1, 2].map(|c: usize| &circle.single[c][k..k + LANES]);
+        let mut k = range.start;
+        while k < range.end {
+            let [cos, sin, angle] = &circle.single[k];
             let mut some = [[0.0; 2]; LANES];
             for n in 0..LANES {
-                let along = sin[n] * (p - angle[n] * s_c) - cos[n] * (q - angle[n] * s_s);
-                let rho = radius + along;
-                some[n] = [x + (x_rest + cos[n] * rho), y + (y_rest + sin[n] * rho)];
+                let along = sin[n] * (p - angle[n] * pen.s_c) - cos[n] * (q - angle[n] * pen.s_s);
+                let rho = pen.radius + along;
+                some[n] = [
+                    pen.centre[0] + (pen.rest[0] + cos[n] * rho),
+                    pen.centre[1] + (pen.rest[1] + sin[n] * rho),
+                ];
             }
             vertices.extend_from_slice(&some);
+            k += LANES;
         }
         vertices.truncate(length);
     }
@@ -185,10 +220,13 @@ impl Outline {
             s_c,
             s_s,
         };
+        let pen = V::pen(&sector);
+        // What is drawn at a time may reach beyond the end.
+        vertices.reserve(circle.directions.len() + contacts.len() + LANES);
         let (mut drawn, mut deepest) = (0, 0.0_f64);
         for (contact, f) in contacts {
             let end = circle.before(contact.angle).max(drawn);
-            V::stretch(circle, drawn..end, &sector, vertices);
+            V::stretch(circle, drawn..end, &sector, pen, vertices);
             let rho = sector.rho(contact);
             deepest = deepest.max(self.radius - rho);
             if tips {
@@ -199,7 +237,13 @@ impl Outline {
             sector.p += turn * contact.cos;
             sector.q += turn * contact.sin;
         }
-        V::stretch(circle, drawn..circle.directions.len(), &sector, vertices);
+        V::stretch(
+            circle,
+            drawn..circle.directions.len(),
+            &sector,
+            pen,
+            vertices,
+        );
         // Every f is at least 0, and rounding is far below a millionth.
         let reach = 1.000_001 * (self.radius + G_MAX * s);
         Extent { deepest, reach }
