@@ -4,11 +4,12 @@
 //! one piece, so that a full disk shows at the message that hit it, and the stores and fields of the footer are sorted,
 //! where rerun's own encoder takes them from a hash map.
 
-use super::ipc::{self, Ipc};
+use super::ipc::{self, Ipc, Pieces};
 use prost::Message as _;
 use prost::encoding::{WireType, encode_key, encode_varint};
 use re_protos::common::v1alpha1::Compression as Compressed;
 use re_protos::log_msg::v1alpha1 as protocol;
+use re_sorbet::ChunkBatch;
 use rerun::external::re_log_encoding::ToTransport as _;
 use rerun::external::re_log_encoding::rrd::{
     Compression, CrateVersion, Encodable as _, EncodingOptions, MessageHeader, MessageKind,
@@ -21,6 +22,22 @@ use rerun::external::re_tuid::Tuid;
 use rerun::log::{Chunk, ChunkId, RowId};
 use rerun::{AsComponents, TimePoint};
 use std::io::{self, IoSlice, Write};
+
+/// Where a message lies, without its header, and its size uncompressed.
+#[derive(Clone, Copy)]
+struct Place {
+    span: re_span::Span<u64>,
+    size: u64,
+}
+
+/// A batch as a message of rerun's.
+fn whole(batch: &ChunkBatch) -> ArrowMsg {
+    ArrowMsg {
+        chunk_id: batch.chunk_id().as_tuid(),
+        batch: batch.into(),
+        on_release: None,
+    }
+}
 
 /// What pads values.
 const ZEROS: [u8; 64] = [0; 64];
@@ -129,15 +146,27 @@ impl<W: Write> Encoder<W> {
                 StoreSource::Other(env!("CARGO_PKG_NAME").to_owned()),
             ),
         }))
+        .map(|_| ())
     }
 
     /// Writes a chunk into a store.
     pub fn append(&mut self, store: &StoreId, chunk: &Chunk) -> io::Result<()> {
-        let arrow = chunk.to_arrow_msg().map_err(io::Error::other)?;
-        let pieces = self.ipc.pieces(&arrow.batch).map_err(io::Error::other)?;
-        let Some(pieces) = pieces else {
-            return self.message(&LogMsg::ArrowMsg(store.clone(), arrow));
+        let batch = chunk.to_chunk_batch().map_err(io::Error::other)?;
+        let pieces = self.ipc.pieces(&batch).map_err(io::Error::other)?;
+        let place = match pieces {
+            Some(pieces) => self.message_in_pieces(store, &batch, &pieces)?,
+            None => self.message(&LogMsg::ArrowMsg(store.clone(), whole(&batch)))?,
         };
+        self.list(store, &batch, place)
+    }
+
+    /// Writes a record batch without a copy of its values.
+    fn message_in_pieces(
+        &mut self,
+        store: &StoreId,
+        batch: &ChunkBatch,
+        pieces: &Pieces,
+    ) -> io::Result<Place> {
         let size = pieces.len() as u64;
         // The payload is field 5 of the message, between its others.
         let before = protocol::ArrowMsg {
@@ -148,21 +177,21 @@ impl<W: Write> Encoder<W> {
             ..Default::default()
         };
         let behind = protocol::ArrowMsg {
-            chunk_id: Some(arrow.chunk_id.into()),
-            is_static: re_sorbet::is_static_chunk(&arrow.batch),
+            chunk_id: Some(batch.chunk_id().as_tuid().into()),
+            is_static: Some(batch.is_static()),
             ..Default::default()
         };
         let (mut open, mut close) = (before.encode_to_vec(), ipc::END.to_vec());
         encode_key(5, WireType::LengthDelimited, &mut open);
         encode_varint(size, &mut open);
         close.extend(behind.encode_to_vec());
-        let len = open.len() as u64 + size + (close.len() - ipc::END.len()) as u64;
+        let len = (open.len() + close.len() - ipc::END.len()) as u64 + size;
         self.buffer.clear();
         let kind = MessageKind::ArrowMsg;
         MessageHeader { kind, len }
             .to_rrd_bytes(&mut self.buffer)
             .map_err(io::Error::other)?;
-        let header = self.buffer.len() as u64;
+        let start = self.written + self.buffer.len() as u64;
         self.buffer.extend_from_slice(&open);
         self.buffer.extend_from_slice(&pieces.head);
         let mut slices = Vec::with_capacity(2 * pieces.buffers.len() + 2);
@@ -174,9 +203,9 @@ impl<W: Write> Encoder<W> {
         }
         slices.push(IoSlice::new(&close));
         write_all_slices(&mut self.sink, &mut slices)?;
-        let start = self.written + header;
         self.written = start + len;
-        self.list(store, &arrow, re_span::Span { start, len }, size)
+        let span = re_span::Span { start, len };
+        Ok(Place { span, size })
     }
 
     /// Makes a blueprint the one that the viewer shows.
@@ -188,9 +217,10 @@ impl<W: Write> Encoder<W> {
                 make_default: true,
             },
         ))
+        .map(|_| ())
     }
 
-    fn message(&mut self, message: &LogMsg) -> io::Result<()> {
+    fn message(&mut self, message: &LogMsg) -> io::Result<Place> {
         let transport = message
             .to_transport(Compression::Off)
             .map_err(io::Error::other)?;
@@ -205,35 +235,24 @@ impl<W: Write> Encoder<W> {
             len: self.buffer.len() as u64 - header,
         };
         self.written += self.buffer.len() as u64;
-        match message {
-            LogMsg::ArrowMsg(store, arrow) => {
-                self.list(store, arrow, span, transport.byte_size_uncompressed())
-            }
-            _ => Ok(()),
-        }
+        let size = transport.byte_size_uncompressed();
+        Ok(Place { span, size })
     }
 
-    /// Remembers a chunk for the footer: where it lies, and its size uncompressed.
-    fn list(
-        &mut self,
-        store: &StoreId,
-        arrow: &ArrowMsg,
-        span: re_span::Span<u64>,
-        size: u64,
-    ) -> io::Result<()> {
+    /// Remembers a chunk for the footer.
+    fn list(&mut self, store: &StoreId, batch: &ChunkBatch, place: Place) -> io::Result<()> {
         let Some(manifests) = &mut self.manifests else {
             return Ok(());
         };
-        let batch = re_sorbet::ChunkBatch::try_from(&arrow.batch).map_err(io::Error::other)?;
         let known = manifests.iter().position(|(id, _)| id == store);
-        let place = known.unwrap_or(manifests.len());
+        let index = known.unwrap_or(manifests.len());
         if known.is_none() {
             let manifest = RrdManifestBuilder::default();
             manifests.push((store.clone(), manifest));
         }
-        let manifest = &mut manifests[place].1;
+        let manifest = &mut manifests[index].1;
         manifest
-            .append(&batch, span, size)
+            .append(batch, place.span, place.size)
             .map_err(io::Error::other)
     }
 
@@ -324,20 +343,20 @@ mod tests {
         let (mut ours, mut theirs, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
         let mut chunks = Encoder::new(&mut scratch).unwrap();
         let mut pieces = Encoder::new(&mut ours).unwrap();
-        let mut whole = Encoder::new(&mut theirs).unwrap();
+        let mut plain = Encoder::new(&mut theirs).unwrap();
         for (rows, empty) in [(4, false), (1, false), (300, false), (5, true), (2, false)] {
             let chunk = chunk(&mut chunks, rows, empty);
-            let arrow = chunk.to_arrow_msg().unwrap();
-            let taken = pieces.ipc.pieces(&arrow.batch).unwrap();
+            let batch = chunk.to_chunk_batch().unwrap();
+            let taken = pieces.ipc.pieces(&batch).unwrap();
             assert_eq!(taken.is_some(), !empty);
             pieces.append(&store, &chunk).unwrap();
-            whole
-                .message(&LogMsg::ArrowMsg(store.clone(), arrow))
-                .unwrap();
-            assert_eq!(pieces.written(), whole.written());
+            let message = LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg().unwrap());
+            let place = plain.message(&message).unwrap();
+            plain.list(&store, &batch, place).unwrap();
+            assert_eq!(pieces.written(), plain.written());
         }
         pieces.finish().unwrap();
-        whole.finish().unwrap();
+        plain.finish().unwrap();
         assert!(ours == theirs);
         assert!(ours.len() > 50_000);
     }
