@@ -106,33 +106,23 @@ impl Frame {
     /// ```
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
-        let mut hash = blake3::Hasher::new();
+        let minimizer = self.minimizer.values();
         let mut buffer = Vec::with_capacity(
-            64 + 32 * self.positions.len()
-                + 16 * self.contacts.len()
-                + 8 * self.minimizer.values().len(),
+            32 + 32 * self.positions.len() + 16 * self.contacts.len() + 8 * minimizer.len(),
         );
         let count = |n: usize| (n as u64).to_le_bytes();
+        let vector = |v: &Vec2| [v.x.to_le_bytes(), v.y.to_le_bytes()];
+        let pair = |[i, j]: &[u32; 2]| [i.to_le_bytes(), j.to_le_bytes()];
         buffer.extend_from_slice(&self.step.to_le_bytes());
         buffer.extend_from_slice(&count(self.positions.len()));
-        for v in self.positions.iter().chain(&self.velocities) {
-            buffer.extend_from_slice(&v.x.to_le_bytes());
-            buffer.extend_from_slice(&v.y.to_le_bytes());
-        }
+        append(&mut buffer, self.positions.iter().map(vector));
+        append(&mut buffer, self.velocities.iter().map(vector));
         buffer.extend_from_slice(&count(self.contacts.len()));
-        for c in self.contacts.iter().flatten() {
-            buffer.extend_from_slice(&c.to_le_bytes());
-        }
-        for f in &self.forces {
-            buffer.extend_from_slice(&f.to_le_bytes());
-        }
-        let minimizer = self.minimizer.values();
+        append(&mut buffer, self.contacts.iter().map(pair));
+        append(&mut buffer, self.forces.iter().map(|f| [f.to_le_bytes()]));
         buffer.extend_from_slice(&count(minimizer.len()));
-        for v in minimizer {
-            buffer.extend_from_slice(&v.to_le_bytes());
-        }
-        hash.update(&buffer);
-        *hash.finalize().as_bytes()
+        append(&mut buffer, minimizer.iter().map(|x| [x.to_le_bytes()]));
+        *blake3::hash(&buffer).as_bytes()
     }
 
     /// Checks that the frame can belong to `particles` particles in `domain`: lengths, order of contacts, positions in
@@ -207,6 +197,19 @@ impl Frame {
             }
         }
         Ok(())
+    }
+}
+
+/// Appends cells of `W` numbers of `B` bytes each; with sizes that are known it is a copy in memory.
+fn append<const B: usize, const W: usize>(
+    bytes: &mut Vec<u8>,
+    cells: impl ExactSizeIterator<Item = [[u8; B]; W]>,
+) {
+    let start = bytes.len();
+    bytes.resize(start + cells.len() * W * B, 0);
+    let rows = bytes[start..].as_chunks_mut::<B>().0.as_chunks_mut::<W>();
+    for (row, cell) in rows.0.iter_mut().zip(cells) {
+        *row = cell;
     }
 }
 

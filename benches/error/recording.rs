@@ -1,16 +1,14 @@
-//! (e) What recording costs: steps a second and bytes a step, with each channel off and on.
+//! (e) What recording costs: time a step and bytes a step, with each channel off and on.
 //!
-//! Runs the program itself, `softjam record`, for a fixed number of steps, and beside it the same steps in the library with no
-//! recorder at all; in turn, medians of several rounds. The program is `target/release/softjam`, or what `SOFTJAM` names.
+//! Runs the program itself, `softjam record`, for two numbers of steps in turn: what the longer run takes beyond the shorter
+//! is the cost of its steps, the rest is fixed: the file opened, begun, ended and brought to the disk. Without a channel
+//! nothing is recorded but the metrics of the first and the last step. A usual run, N = 1024 and φ = 0.86 to `f_max` of 1e-10, takes about
+//! 1700 steps. The program is `target/release/softjam`, or what `SOFTJAM` names; files go to the folder for temporary files.
 
 use super::table::{Table, digits, median};
-use softjam::disks;
-use softjam::relax::Relaxation;
-use softjam::scene::{Scene, start};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 
 const CHANNELS: [&str; 9] = [
     "contours,contacts,metrics,state",
@@ -31,6 +29,8 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
         "steps",
         "steps_per_s",
         "slowdown",
+        "fixed_ms",
+        "slowdown_of_the_run",
         "bytes_per_step",
     ]);
     let program = std::env::var_os("SOFTJAM")
@@ -42,69 +42,72 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
         );
         return Ok(table);
     }
-    let (particles, steps, rounds) = if quick { (64, 50, 1) } else { (1024, 2000, 3) };
-    let mut alone = Vec::new();
-    let mut recorded: Vec<Vec<(f64, f64)>> = vec![Vec::new(); CHANNELS.len()];
+    let (particles, few, steps, rounds) = if quick {
+        (64, 10, 50, 1)
+    } else {
+        (1024, 400, 2000, 9)
+    };
+    let run = |steps: u64, channels: &str| record(&program, particles, steps, channels);
+    let mut measured: Vec<Vec<Times>> = vec![Vec::new(); CHANNELS.len()];
     for _ in 0..rounds {
-        alone.push(without(particles, steps)?);
-        for (list, channels) in recorded.iter_mut().zip(CHANNELS) {
-            list.push(with(&program, particles, steps, channels)?);
+        for (list, channels) in measured.iter_mut().zip(CHANNELS) {
+            // What is compared is measured right before.
+            let bare = (run(few, "none")?.0, run(steps, "none")?.0);
+            let (short, less) = run(few, channels)?;
+            let (long, bytes) = run(steps, channels)?;
+            list.push(Times {
+                bare,
+                recorded: (short, long),
+                bytes: (bytes - less) / (steps - few) as f64,
+            });
         }
     }
-    let base = median(alone);
-    // What a file holds whatever its length: scene, radii, blueprint.
-    let mut fixed = Vec::new();
-    for channels in CHANNELS {
-        fixed.push(with(&program, particles, 0, channels)?.1);
-    }
-    let mut row = |channels: &str, rate: f64, bytes: f64| {
+    let more = (steps - few) as f64;
+    let of = |list: &[Times], f: &dyn Fn(&Times) -> f64| median(list.iter().map(f).collect());
+    let a_step = |(short, long): (f64, f64)| (long - short) / more;
+    let mut row = |channels: &str, list: &[Times], pick: fn(&Times) -> (f64, f64), bytes: f64| {
+        let each = of(list, &|t| a_step(pick(t)));
+        let slowdown = of(list, &|t| a_step(pick(t)) / a_step(t.bare));
+        let fixed = of(list, &|t| pick(t).1 - steps as f64 * a_step(pick(t)));
+        let whole = of(list, &|t| pick(t).1 / t.bare.1);
         table.push(vec![
             particles.to_string(),
             channels.replace(',', " "),
             steps.to_string(),
-            format!("{rate:.0}"),
-            format!("{:.3}", base / rate),
+            format!("{:.0}", 1.0 / each),
+            format!("{slowdown:.3}"),
+            format!("{:.1}", 1e3 * fixed),
+            format!("{whole:.3}"),
             digits(bytes),
         ]);
     };
-    row("none", base, 0.0);
-    for ((list, channels), fixed) in recorded.iter().zip(CHANNELS).zip(fixed) {
-        let rate = median(list.iter().map(|r| r.0).collect());
-        row(channels, rate, (list[0].1 - fixed) / steps as f64);
+    row("none", &measured.concat(), |t| t.bare, 0.0);
+    for (list, channels) in measured.iter().zip(CHANNELS) {
+        row(channels, list, |t| t.recorded, list[0].bytes);
     }
     Ok(table)
 }
 
-/// Steps a second of the library alone.
-fn without(particles: usize, steps: u64) -> Result<f64, Box<dyn Error>> {
-    let scene = Scene {
-        particles,
-        threshold: 1e-300,
-        steps,
-        ..Scene::default()
-    };
-    let mut packing = start::packing(&scene)?;
-    disks::relax(&mut packing, &scene.disks, scene.line_tension);
-    let mut run = Relaxation::of_packing(&scene, packing)?;
-    let clock = Instant::now();
-    for _ in 0..steps {
-        run.advance()?;
-    }
-    Ok(steps as f64 / clock.elapsed().as_secs_f64())
+/// What a run of few steps and one of many take (s), without and with a channel, and the bytes of a step.
+#[derive(Clone, Copy)]
+struct Times {
+    bare: (f64, f64),
+    recorded: (f64, f64),
+    bytes: f64,
 }
 
-/// Steps a second as the program reports them, and the bytes of the file.
-fn with(
+/// The time of a run (s), from its first step until its file is closed, and the bytes of the file.
+fn record(
     program: &Path,
     particles: usize,
     steps: u64,
     channels: &str,
 ) -> Result<(f64, f64), Box<dyn Error>> {
     let file = std::env::temp_dir().join(format!("softjam-benchmark-{}.rrd", std::process::id()));
-    let every: Vec<String> = channels
-        .split(',')
-        .map(|c| format!("{c}=every:1"))
-        .collect();
+    let every: Vec<String> = match channels {
+        "none" => vec![format!("metrics=every:{}", u32::MAX)],
+        some => some.split(',').map(|c| format!("{c}=every:1")).collect(),
+    };
     let output = Command::new(program)
         .args(["record", "--force", "--threshold", "1e-300"])
         .args([
@@ -126,5 +129,5 @@ fn with(
         .find(|l| l.starts_with("time"))
         .and_then(|l| l.rsplit_once('(')?.1.split(' ').next()?.parse::<f64>().ok())
         .ok_or_else(|| format!("no rate in: {text}"))?;
-    Ok((rate, bytes))
+    Ok((steps as f64 / rate, bytes))
 }

@@ -18,11 +18,12 @@
 //! Near a contact the notches of the two particles overlap in a thin lens of half-width `f R_eff/γ` and depth
 //! `f² R_eff/4γ²`, `R_eff = 2 R_i R_j/(R_i + R_j)`: that is what the linear model says, and it is drawn as it is.
 
-use super::kernel::Direction;
-use super::outline::Outline;
-pub(crate) use super::outline::Vertex;
+use super::kernel::{Angles, Direction};
+use super::outline::{Circle, Outline};
+pub(crate) use super::outline::{Extent, Stretch};
 use crate::contact::Contacts;
 use crate::domain::Vec2;
+use crate::wide::wide;
 use core::f64::consts::PI;
 
 /// How a contour becomes a polygon.
@@ -88,8 +89,7 @@ pub enum Placement {
 #[derive(Clone, Debug)]
 pub struct Contours {
     style: ContourStyle,
-    /// The equally spaced directions, by ascending angle in `(−π, π]`.
-    circle: Vec<Direction>,
+    circle: Circle,
     /// How many of them come before angle 0.
     below: usize,
     /// Polygon `p` is `vertices[first[p]..first[p + 1]]`.
@@ -98,6 +98,9 @@ pub struct Contours {
     /// The contacts of each particle: `contacts[entry[p]..entry[p + 1]]` are its directions and forces.
     entry: Vec<usize>,
     contacts: Vec<(Direction, f64)>,
+    /// The unit vectors from `i` to `j` of all contacts, by their components, and their angles.
+    toward: [Vec<f64>; 3],
+    nodes: Vec<[f64; 2]>,
     evaluations: u64,
 }
 
@@ -123,12 +126,14 @@ impl Contours {
             .collect();
         Self {
             style,
-            circle,
+            circle: Circle::of(circle),
             below,
             first: vec![0],
             vertices: Vec::new(),
             entry: Vec::new(),
             contacts: Vec::new(),
+            toward: Default::default(),
+            nodes: Vec::new(),
             evaluations: 0,
         }
     }
@@ -163,22 +168,25 @@ impl Contours {
     }
 
     /// Appends the polygons of [`draw`](Self::draw) to `vertices`, in double or in a viewer's single precision; `drawn` is
-    /// called after each of them with all vertices so far, the place of its first, and its deepest dent, the largest
-    /// `R_i − ρ_i` at a contact (length).
-    pub(crate) fn trace<V: Vertex>(
+    /// called after each of them with all vertices so far, the place of its first, and how far it is from a circle.
+    pub(crate) fn trace<V: Stretch>(
         &mut self,
         (radii, positions, contacts, line_tension): (&[f64], &[Vec2], &Contacts<'_>, f64),
         vertices: &mut Vec<V>,
-        mut drawn: impl FnMut(&mut Vec<V>, usize, f64),
+        mut drawn: impl FnMut(&mut Vec<V>, usize, Extent),
     ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
         self.gather(radii.len(), contacts);
         for (p, (&radius, &centre)) in radii.iter().zip(positions).enumerate() {
             let contacts = &mut self.contacts[self.entry[p]..self.entry[p + 1]];
-            let (start, mut deepest) = (vertices.len(), 0.0);
+            let start = vertices.len();
+            let mut extent = Extent {
+                deepest: 0.0,
+                reach: 1.000_001 * radius,
+            };
             if contacts.is_empty() {
                 let point = |d: &Direction| V::at(centre, *d, radius);
-                vertices.extend(self.circle.iter().map(point));
+                vertices.extend(self.circle.directions.iter().map(point));
             } else {
                 contacts.sort_unstable_by(|a, b| a.0.angle.total_cmp(&b.0.angle));
                 let outline = Outline {
@@ -187,14 +195,14 @@ impl Contours {
                     scale: radius / (2.0 * PI * line_tension),
                 };
                 let tips = self.style.placement == Placement::Contacts;
-                deepest = outline.draw(&self.circle, contacts, tips, vertices);
+                extent = outline.draw(&self.circle, contacts, tips, vertices);
                 self.evaluations += (vertices.len() - start) as u64;
             }
             // Equal angles are counted from 0; with vertices on the contacts any of them may be the first.
             if contacts.is_empty() || self.style.placement == Placement::Equal {
                 vertices[start..].rotate_left(self.below);
             }
-            drawn(vertices, start, deepest);
+            drawn(vertices, start, extent);
         }
     }
 
@@ -213,17 +221,24 @@ impl Contours {
             sin: 0.0,
             angle: 0.0,
         };
-        self.contacts.clear();
         self.contacts
             .resize(2 * contacts.pairs.len(), (nowhere, 0.0));
+        let [x, y, angles] = &mut self.toward;
+        x.clear();
+        x.extend(contacts.normals.iter().map(|n| -n.x));
+        y.clear();
+        y.extend(contacts.normals.iter().map(|n| -n.y));
+        angles.resize(x.len(), 0.0);
+        let nodes = &mut self.nodes;
+        wide(
+            #[inline(always)]
+            || Angles::new().of_columns((x, y), nodes, angles),
+        );
         // `entry[p + 1]` runs through the places of p and ends where those of p + 1 begin.
-        for ((&[i, j], n), &f) in contacts
-            .pairs
-            .iter()
-            .zip(contacts.normals)
-            .zip(contacts.forces)
-        {
-            let to_j = Direction::of(-n);
+        let rows = contacts.pairs.iter().zip(contacts.forces);
+        let toward = x.iter().zip(&*y).zip(&*angles);
+        for ((&[i, j], &f), ((&cos, &sin), &angle)) in rows.zip(toward) {
+            let to_j = Direction { cos, sin, angle };
             for (p, direction) in [(i, to_j), (j, to_j.opposite())] {
                 let place = &mut self.entry[p as usize + 1];
                 self.contacts[*place] = (direction, f);

@@ -1,6 +1,7 @@
 //! Rattlers and the backbone: which particles are held by their contacts.
 
 use crate::contact::Contacts;
+use crate::wide::wide;
 
 /// Rattlers, and the contacts left among the other particles: particles with fewer than three contacts are taken away
 /// with their contacts, until none is left or each has three.
@@ -44,7 +45,12 @@ pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
     numbers.iter().map(|n| *n >= 3).collect()
 }
 
-/// Counts rattlers frame after frame, and counts anew only when the contacts have changed.
+/// Counts rattlers frame after frame, and counts anew only when contacts have come or gone that matter.
+///
+/// The particles that are held, and the contacts among them, are the largest set of contacts in which each particle has at
+/// least three: it is a property of the contacts and not of the order in which others were taken away. It stays, but for the
+/// contacts that come and go within it, as long as each of its particles keeps three and no contact comes that could belong to
+/// a larger one: that would need three contacts of each of its particles.
 ///
 /// ```
 /// use softjam::{force::Backbone, relax::Relaxation, scene::Scene};
@@ -59,11 +65,17 @@ pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Backbone {
-    particles: usize,
-    /// The contacts of the last count, if all of them bore a force.
-    pairs: Option<Vec<[u32; 2]>>,
-    /// Rattlers, and contacts between the others.
-    last: (usize, usize),
+    /// The contacts of the frame before that bore a force.
+    pairs: Vec<[u32; 2]>,
+    /// Contacts of each particle.
+    all: Vec<u32>,
+    /// Contacts of each particle that is held with others that are; below 3 where it is not held.
+    held: Vec<u32>,
+    /// Contacts between particles that are held.
+    contacts: usize,
+    rattlers: usize,
+    /// Contacts that came since the frame before, one of whose particles is not held.
+    open: Vec<[u32; 2]>,
     counts: u64,
 }
 
@@ -77,31 +89,124 @@ impl Backbone {
     ///
     /// See the example of [`Backbone`].
     pub fn count(&mut self, particles: usize, contacts: &Contacts<'_>) -> (usize, usize) {
-        let all = contacts.forces.iter().all(|f| *f > 0.0);
-        let same = particles == self.particles && self.pairs.as_deref() == Some(contacts.pairs);
-        if all && same {
-            return self.last;
-        }
-        self.last = if all {
-            backbone(particles, contacts.pairs)
-        } else {
-            let touching = contacts.pairs.iter().zip(contacts.forces);
-            let touching = touching.filter(|(_, f)| **f > 0.0).map(|(p, _)| *p);
-            backbone(particles, &touching.collect::<Vec<_>>())
-        };
-        self.particles = particles;
-        self.pairs = all.then(|| contacts.pairs.to_vec());
-        self.counts += 1;
-        self.last
+        let touching = contacts.forces.iter().filter(|f| **f > 0.0).count();
+        self.count_touching(particles, contacts, touching)
     }
 
-    /// How often it was counted so far: a count of work.
+    /// [`count`](Self::count) of contacts of which `touching` bear a force.
+    pub(super) fn count_touching(
+        &mut self,
+        particles: usize,
+        contacts: &Contacts<'_>,
+        touching: usize,
+    ) -> (usize, usize) {
+        if touching == contacts.pairs.len() {
+            self.follow(particles, contacts.pairs);
+        } else {
+            let pairs = contacts.pairs.iter().zip(contacts.forces);
+            let pairs = pairs.filter(|(_, f)| **f > 0.0).map(|(p, _)| *p);
+            self.follow(particles, &pairs.collect::<Vec<_>>());
+        }
+        (self.rattlers, self.contacts)
+    }
+
+    /// Goes on to `pairs`.
+    fn follow(&mut self, particles: usize, pairs: &[[u32; 2]]) {
+        let mut stays = particles == self.all.len();
+        let mut same = true;
+        if stays {
+            self.open.clear();
+            let (all, held) = (&mut self.all, &mut self.held);
+            differences(&self.pairs, pairs, |pair, came| {
+                same = false;
+                let [i, j] = pair.map(|p| p as usize);
+                let both = held[i] >= 3 && held[j] >= 3;
+                for p in [i, j] {
+                    let change = |n: &mut u32| *n = if came { *n + 1 } else { *n - 1 };
+                    change(&mut all[p]);
+                    if both {
+                        change(&mut held[p]);
+                        stays &= held[p] >= 3;
+                    }
+                }
+                match (both, came) {
+                    (true, true) => self.contacts += 1,
+                    (true, false) => self.contacts -= 1,
+                    (false, true) => self.open.push(pair),
+                    (false, false) => {}
+                }
+            });
+            let weak = |p: u32| held[p as usize] < 3 && all[p as usize] < 3;
+            stays &= self.open.iter().all(|&[i, j]| weak(i) || weak(j));
+        }
+        if stays && same {
+            return;
+        }
+        if !stays {
+            self.all.clear();
+            self.all.resize(particles, 0);
+            for p in pairs.as_flattened() {
+                self.all[*p as usize] += 1;
+            }
+            (self.held, self.contacts) = held_contacts(particles, pairs);
+            self.rattlers = self.held.iter().filter(|n| **n < 3).count();
+            self.counts += 1;
+        }
+        self.pairs.clear();
+        self.pairs.extend_from_slice(pairs);
+    }
+
+    /// How often it was counted anew so far: a count of work.
     ///
     /// See the example of [`Backbone`].
     #[must_use]
     pub fn counts(&self) -> u64 {
         self.counts
     }
+}
+
+/// Tells `each` of the pairs that `old` has alone (`false`) and `new` has alone (`true`), both in ascending order.
+fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2], bool)) {
+    let (mut old, mut new) = (old, new);
+    loop {
+        let same = common(old, new);
+        (old, new) = (&old[same..], &new[same..]);
+        match (old.split_first(), new.split_first()) {
+            (None, None) => return,
+            (_, Some((came, rest))) if old.first().is_none_or(|gone| came < gone) => {
+                each(*came, true);
+                new = rest;
+            }
+            (Some((gone, rest)), _) => {
+                each(*gone, false);
+                old = rest;
+            }
+            (None, Some(_)) => return,
+        }
+    }
+}
+
+/// How many pairs at the beginning of `a` and `b` are the same.
+fn common(a: &[[u32; 2]], b: &[[u32; 2]]) -> usize {
+    let (a16, b16) = (a.as_chunks::<16>().0, b.as_chunks::<16>().0);
+    let mut start = 0;
+    wide(
+        #[inline(always)]
+        || {
+            for (a, b) in a16.iter().zip(b16) {
+                let mut bits = 0;
+                for k in 0..16 {
+                    bits |= (a[k][0] ^ b[k][0]) | (a[k][1] ^ b[k][1]);
+                }
+                if bits != 0 {
+                    break;
+                }
+                start += 16;
+            }
+        },
+    );
+    let rest = a[start..].iter().zip(&b[start..]);
+    start + rest.take_while(|(a, b)| a == b).count()
 }
 
 /// The number of contacts of each particle with others that are held, and the number of contacts between such.
@@ -130,4 +235,68 @@ fn held_contacts(particles: usize, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
         left.retain(|pair| stays(pair, &mut passed));
     }
     (contacts, left.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    /// Sparse and dense, so that contacts that matter and contacts that do not come and go.
+    #[test]
+    fn following_contacts_counts_what_counting_them_anew_does() {
+        let mut bits = 1_u64;
+        let mut random = |below: u32| {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005);
+            bits = bits.wrapping_add(1_442_695_040_888_963_407);
+            ((bits >> 33) % u64::from(below)) as u32
+        };
+        let (mut anew, mut rattling, mut held) = (0, 0, 0);
+        for particles in [5, 12, 40] {
+            let mut backbone = Backbone::default();
+            let mut pairs = BTreeSet::new();
+            for step in 0..3000 {
+                let most = 1 + particles * (1 + step / 1000);
+                for _ in 0..random(3) {
+                    let (i, j) = (random(particles), random(particles));
+                    let pair = [i.min(j), i.max(j)];
+                    if pairs.len() > most as usize || !(i != j && pairs.insert(pair)) {
+                        pairs.remove(&pair);
+                    }
+                }
+                if pairs.len() > most as usize {
+                    pairs.pop_first();
+                }
+                let list: Vec<_> = pairs.iter().copied().collect();
+                backbone.follow(particles as usize, &list);
+                let (rattlers, contacts) = self::backbone(particles as usize, &list);
+                assert_eq!((backbone.rattlers, backbone.contacts), (rattlers, contacts));
+                rattling += rattlers;
+                held += particles as usize - rattlers;
+            }
+            anew += backbone.counts();
+        }
+        assert!(anew < 3 * 3000 / 2, "{anew} counts");
+        assert!(rattling > 10_000 && held > 10_000, "{rattling} {held}");
+    }
+
+    #[test]
+    fn differences_are_what_one_list_has_alone() {
+        let all: Vec<_> = (0..100).map(|k| [k / 7, k]).collect();
+        let old: Vec<_> = all.iter().copied().filter(|p| p[1] % 17 != 3).collect();
+        let new: Vec<_> = all.iter().copied().filter(|p| p[1] % 23 != 5).collect();
+        let (mut gone, mut came) = (Vec::new(), Vec::new());
+        differences(
+            &old,
+            &new,
+            |[_, j], new| {
+                if new { came.push(j) } else { gone.push(j) }
+            },
+        );
+        assert_eq!(came, [3, 20, 37, 54, 71, 88]);
+        assert_eq!(gone, [5, 28, 51, 74, 97]);
+        differences(&new, &new, |_, _| panic!("the same"));
+        differences(&[], &new[..2], |pair, came| assert!(came && pair[0] == 0));
+        differences(&new[..2], &[], |pair, came| assert!(!came && pair[0] == 0));
+    }
 }

@@ -260,20 +260,16 @@ impl Observables {
             dt,
             ..Self::default()
         };
-        for (c, &f) in contacts.forces.iter().enumerate() {
-            let n = contacts.normals[c];
-            let moment = f * contacts.distances[c];
-            o.energy += 0.5 * contacts.overlaps[c] * f;
-            o.stress[0] -= moment * n.x * n.x;
-            o.stress[1] -= moment * n.x * n.y;
-            o.stress[2] -= moment * n.y * n.y;
-            o.contacts += usize::from(f > 0.0);
-        }
+        let sums = Sums::of(contacts);
+        o.energy = 0.5 * total(sums.work);
+        o.stress = sums.moments.map(|chains| 0.0 - total(chains));
+        o.contacts = total(sums.touching) as usize;
         o.energy /= line_tension;
         for s in &mut o.stress {
             *s /= domain.area() * line_tension;
         }
-        (o.rattlers, o.backbone_contacts) = backbone.count(particles, contacts);
+        (o.rattlers, o.backbone_contacts) =
+            backbone.count_touching(particles, contacts, o.contacts);
         o
     }
 
@@ -363,6 +359,59 @@ impl Observables {
     pub fn coordination(&self) -> f64 {
         mean_coordination(self.backbone_contacts, self.particles - self.rattlers)
     }
+}
+
+/// Sums over contacts, each in eight chains: contact `c` belongs to chain `c mod 8`, and the chains are added in turn.
+#[derive(Default)]
+struct Sums {
+    /// `Σ_c δ_c f_c` (force·length).
+    work: [f64; 8],
+    /// `Σ_c f_c r_c n_α n_β` for xx, xy and yy (force·length).
+    moments: [[f64; 8]; 3],
+    /// Number of contacts with `f > 0`.
+    touching: [f64; 8],
+}
+
+impl Sums {
+    fn of(contacts: &Contacts<'_>) -> Self {
+        wide(
+            #[inline(always)]
+            || Self::of_all(contacts),
+        )
+    }
+
+    #[inline(always)]
+    fn of_all(contacts: &Contacts<'_>) -> Self {
+        let mut sums = Self::default();
+        let (forces, last_forces) = contacts.forces.as_chunks::<8>();
+        let (normals, last_normals) = contacts.normals.as_chunks::<8>();
+        let (distances, last_distances) = contacts.distances.as_chunks::<8>();
+        let (overlaps, last_overlaps) = contacts.overlaps.as_chunks::<8>();
+        for (((f, n), r), o) in forces.iter().zip(normals).zip(distances).zip(overlaps) {
+            for k in 0..8 {
+                sums.add(k, (f[k], n[k], r[k], o[k]));
+            }
+        }
+        for (k, &f) in last_forces.iter().enumerate() {
+            sums.add(k, (f, last_normals[k], last_distances[k], last_overlaps[k]));
+        }
+        sums
+    }
+
+    /// Adds a contact, by force, normal, distance and overlap, to the chain `k`.
+    #[inline(always)]
+    fn add(&mut self, k: usize, (f, n, distance, overlap): (f64, Vec2, f64, f64)) {
+        let moment = f * distance;
+        self.work[k] += overlap * f;
+        self.moments[0][k] += moment * n.x * n.x;
+        self.moments[1][k] += moment * n.x * n.y;
+        self.moments[2][k] += moment * n.y * n.y;
+        self.touching[k] += if f > 0.0 { 1.0 } else { 0.0 };
+    }
+}
+
+fn total(chains: [f64; 8]) -> f64 {
+    chains.into_iter().sum()
 }
 
 /// `Z = 2 N_c / N` of `held` particles with `contacts` among them; 0 where there is none.

@@ -84,7 +84,8 @@ impl<T: Number, const W: usize> Cells<T, W> {
 /// Rows of short texts, one for each instance.
 #[derive(Clone, Default)]
 pub(super) struct Texts {
-    text: String,
+    /// ASCII.
+    text: Vec<u8>,
     /// Where each text ends.
     ends: Vec<usize>,
     /// Where the texts of each row end.
@@ -95,7 +96,7 @@ impl Texts {
     /// Room for as much as `other` holds.
     pub fn with_room_of(other: &Self) -> Self {
         Self {
-            text: String::with_capacity(other.text.len() + other.text.len() / 8),
+            text: Vec::with_capacity(other.text.len() + other.text.len() / 8),
             ends: Vec::with_capacity(other.ends.len()),
             rows: Vec::with_capacity(other.rows.len()),
         }
@@ -103,27 +104,28 @@ impl Texts {
 
     /// Adds to the text at hand.
     pub fn push(&mut self, text: &str) {
-        self.text.push_str(text);
+        self.text.extend_from_slice(text.as_bytes());
     }
 
     /// Adds a count to the text at hand.
     pub fn push_count(&mut self, count: u32) {
-        let first = self.text.len();
-        let mut rest = count;
-        loop {
-            self.text.insert(first, digit(rest));
+        let (mut digits, mut first, mut rest) = ([0; 10], 10, count);
+        while first > 0 {
+            first -= 1;
+            digits[first] = digit(rest);
             rest /= 10;
             if rest == 0 {
                 break;
             }
         }
+        self.text.extend_from_slice(&digits[first..]);
     }
 
     /// Adds a number to the text at hand, rounded to three digits: `0.0346`, `12.3`, `461`, `4.61e-8`. The general way to
     /// print a number takes ten times as long.
     pub fn push_number(&mut self, x: f64) {
         if !(1e-300..1e300).contains(&x) {
-            self.text.push_str(if x == 0.0 { "0" } else { "?" });
+            self.push(if x == 0.0 { "0" } else { "?" });
             return;
         }
         // x is about m · 10⁻ᵏ with 100 ≤ m < 1000.
@@ -135,25 +137,24 @@ impl Texts {
             (m, k) = (0.1 * m, k - 1);
         }
         let m = (m + 0.5) as u32;
-        if (0..=6).contains(&k) {
-            let one = 10_u32.pow(k.unsigned_abs());
-            self.push_count(m / one);
-            let (mut place, rest) = (one / 10, m % one);
-            if place > 0 {
-                self.text.push('.');
+        let [a, b, c] = [digit(m / 100), digit(m / 10), digit(m)];
+        let text = &mut self.text;
+        match k {
+            0 => text.extend_from_slice(&[a, b, c]),
+            1 => text.extend_from_slice(&[a, b, b'.', c]),
+            2 => text.extend_from_slice(&[a, b'.', b, c]),
+            3..=6 => {
+                let zeros = (k - 3) as usize;
+                text.extend_from_slice(&b"0.000"[..2 + zeros]);
+                text.extend_from_slice(&[a, b, c]);
             }
-            while place > 0 {
-                self.text.push(digit(rest / place));
-                place /= 10;
+            _ => {
+                text.extend_from_slice(&[a, b'.', b, c, b'e']);
+                if k > 2 {
+                    text.push(b'-');
+                }
+                self.push_count((2 - k).unsigned_abs());
             }
-        } else {
-            for c in [digit(m / 100), '.', digit(m / 10), digit(m), 'e'] {
-                self.text.push(c);
-            }
-            if k > 2 {
-                self.text.push('-');
-            }
-            self.push_count((2 - k).unsigned_abs());
         }
     }
 
@@ -170,15 +171,15 @@ impl Texts {
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let (ends, rows) = (offsets(&self.ends)?, offsets(&self.rows)?);
-        let texts = StringArray::try_new(ends, Buffer::from(self.text.into_bytes()), None);
+        let texts = StringArray::try_new(ends, Buffer::from(self.text), None);
         let texts = texts.map_err(io::Error::other)?;
         Ok((descriptor, lists(rows, Arc::new(texts))))
     }
 }
 
 /// The last digit of `n`.
-fn digit(n: u32) -> char {
-    char::from(b'0' + (n % 10) as u8)
+fn digit(n: u32) -> u8 {
+    b'0' + (n % 10) as u8
 }
 
 /// A component of our own, `softjam.Archetype:field`.
@@ -200,7 +201,7 @@ mod tests {
         let printed = |x| {
             let mut texts = Texts::default();
             texts.push_number(x);
-            texts.text
+            String::from_utf8(texts.text).unwrap()
         };
         for (x, text) in [
             (0.0, "0"),
@@ -237,6 +238,6 @@ mod tests {
             texts.push_count(n);
             texts.push(" ");
         }
-        assert_eq!(texts.text, "0 7 10 4294967295 ");
+        assert_eq!(texts.text, b"0 7 10 4294967295 ");
     }
 }

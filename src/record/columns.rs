@@ -3,7 +3,7 @@
 use super::pictures::{Network, Rgb};
 use crate::contact::Contacts;
 use crate::domain::Vec2;
-use crate::droplet::contour::Contours;
+use crate::droplet::contour::{Contours, Extent};
 use crate::frame::Frame;
 use rerun::external::arrow::array::{
     Array, ArrayRef, FixedSizeListArray, Float32Array, ListArray, UInt32Array,
@@ -66,21 +66,21 @@ impl StripRows {
     }
 
     /// Adds the closed contours of all particles to the row at hand: their number of vertices. `each` is told particle,
-    /// contour and deepest dent (length), and says the colour.
+    /// contour and its extent, and says the colour.
     pub fn contours(
         &mut self,
         (contours, radii, frame, contacts, line_tension): Drawing<'_>,
-        mut each: impl FnMut(usize, &[[f32; 2]], f64) -> Rgb,
+        mut each: impl FnMut(usize, &[[f32; 2]], Extent) -> Rgb,
     ) -> usize {
         let (before, mut p) = (self.points.len(), 0);
         let (strips, colors) = (&mut self.strips, &mut self.colors);
         contours.trace(
             (radii, &frame.positions, contacts, line_tension),
             &mut self.points,
-            |points, first, deepest| {
+            |points, first, extent| {
                 points.push(points[first]);
                 strips.push(points.len());
-                colors.push(rgba(each(p, &points[first..], deepest)));
+                colors.push(rgba(each(p, &points[first..], extent)));
                 p += 1;
             },
         );

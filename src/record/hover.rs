@@ -6,7 +6,7 @@
 
 use super::cells::{Cells, Texts, own};
 use super::columns::{Column, rgba};
-use super::pictures::{Particles, dimmed};
+use super::pictures::{Particles, Rgb, dimmed};
 use crate::contact::Contacts;
 use crate::domain::Vec2;
 use rerun::{Ellipses2D, Points2D};
@@ -33,19 +33,17 @@ impl ParticleRows {
         }
     }
 
-    /// Adds the next particle, at `centre` and with its deepest dent relative to its undeformed radius: `p 0.125, Z 5,
-    /// dent 0.0346`; `line_tension` is γ.
+    /// Adds the next particle, number `p`, at `centre`, with the colour of its contour and its deepest dent relative to its
+    /// undeformed radius: `p 0.125, Z 5, dent 0.0346`; `line_tension` is γ.
     pub fn particle(
         &mut self,
-        particles: &Particles,
-        centre: Vec2,
+        (particles, p): (&Particles, usize),
+        (centre, color): (Vec2, Rgb),
         deepest: f64,
         line_tension: f64,
-        p: usize,
     ) {
         self.centres.push([centre.x as f32, centre.y as f32]);
-        self.colors
-            .push([rgba(dimmed(particles.color(p), BRIGHTNESS))]);
+        self.colors.push([rgba(dimmed(color, BRIGHTNESS))]);
         let numbers = &mut self.numbers;
         numbers.push("p ");
         numbers.push_number(particles.pressure[p] / line_tension);

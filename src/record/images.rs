@@ -10,6 +10,15 @@ use super::pictures::{Rgb, dimmed};
 use crate::domain::{Domain, Vec2};
 use std::io;
 
+/// Whether nothing that is no farther than `reach` from `centre` crosses an edge of the box, rounding to single precision
+/// included.
+pub(super) fn is_within(domain: Domain, centre: Vec2, reach: f64) -> bool {
+    let l = domain.lengths();
+    let reach = reach + 1e-6 * (l.x + l.y);
+    let inside = |x: f64, l: f64| x >= reach && x + reach <= l;
+    inside(centre.x, l.x) && inside(centre.y, l.y)
+}
+
 /// The shifts by a period that bring at least one of `vertices` into the open box, but for none at all: none for most
 /// shapes, one for a shape across an edge, up to three for one across a corner.
 pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each: impl FnMut(Vec2)) {

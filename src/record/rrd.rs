@@ -19,33 +19,22 @@
 //! Images, points and disks belong to the channel of the contours or contacts that they stand beside, which are instance by
 //! instance the particles and the contacts of the state.
 //!
-//! Rows are gathered into chunks of about two megabytes, so that a viewer reads few of them; all channels of a batch of
+//! Rows are gathered into chunks of some megabytes, so that a viewer reads few of them; all channels of a batch of
 //! steps are written together, the state last.
 
 use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
 use super::hover::{ContactRows, ParticleRows};
-use super::images::{ImageRows, shifts_of_polygon, shifts_of_segment};
-use super::pictures::{Network, Particles};
-use super::states::StateRows;
+use super::images::ImageRows;
+use super::rows::{Batch, MetricRow, Rows};
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
-use crate::contact::{Contacts, FrameContacts};
-use crate::droplet::contour::Contours;
-use crate::force::{METRICS, Metrics};
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::force::METRICS;
 use rerun::external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt64Array};
 use rerun::external::arrow::buffer::OffsetBuffer;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
 use rerun::{DynamicArchetype, Scalars, TimeColumn, TimePoint};
 use std::io::{self, Write};
-
-/// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
-/// is killed loses no more than a batch.
-const BATCH_BYTES: usize = 1 << 21;
-const BATCH_SNAPSHOTS: usize = 512;
-const BATCH_SPAN: u64 = 2048;
 
 /// Writes snapshots as an `.rrd` stream.
 ///
@@ -74,36 +63,9 @@ const BATCH_SPAN: u64 = 2048;
 /// assert_eq!(record(), record());
 /// ```
 pub struct RrdRecorder<W> {
-    encoder: Encoder<W>,
-    store: StoreId,
-    packing: Packing,
-    line_tension: f64,
-    contours: Contours,
-    pending: Pending,
-    intact: Option<u64>,
-    states: u64,
-    digests: blake3::Hasher,
+    rows: Rows,
+    chunks: Chunks<W>,
 }
-
-/// Rows that wait to be written, by entity.
-#[derive(Default)]
-struct Pending {
-    metrics: Vec<MetricRow>,
-    contours: StripRows,
-    contour_images: ImageRows,
-    particles: ParticleRows,
-    contacts: StripRows,
-    contact_images: ImageRows,
-    contact_numbers: ContactRows,
-    states: StateRows,
-    bytes: usize,
-    snapshots: usize,
-    first: Option<u64>,
-    last: Option<u64>,
-}
-
-/// A step, its simulated time in nanoseconds and its metrics.
-type MetricRow = (u64, i64, Metrics);
 
 impl<W: Write> RrdRecorder<W> {
     /// Starts a recording: blueprint, scene, box, radii.
@@ -129,125 +91,83 @@ impl<W: Write> RrdRecorder<W> {
         encoder.open(&store)?;
         header::write(&mut encoder, &store, &header)?;
         Ok(Self {
-            encoder,
-            store,
-            line_tension: header.scene.line_tension,
-            contours: Contours::new(header.scene.contours),
-            packing: header.packing,
-            pending: Pending::default(),
-            intact: None,
-            states: 0,
-            digests: blake3::Hasher::new(),
+            rows: Rows::new(header),
+            chunks: Chunks {
+                encoder,
+                store,
+                intact: None,
+            },
         })
     }
 
-    fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
-        if snapshot.contours || snapshot.contacts {
-            let contacts = FrameContacts::of(&self.packing, frame);
-            if snapshot.contours {
-                self.draw_particles(snapshot, frame, &contacts.view());
-            }
-            if snapshot.contacts {
-                self.draw_contacts(snapshot, frame, &contacts.view());
-            }
-        }
-        if snapshot.state {
-            let digest = frame.digest();
-            self.digests.update(&digest);
-            self.states += 1;
-            self.pending
-                .states
-                .row(snapshot.nanoseconds, frame, &digest);
-            self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
-        }
-    }
-
-    fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
-        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
-        let (domain, radii) = (self.packing.domain(), self.packing.radii());
-        let seen = Particles::of(radii, contacts);
-        let Pending {
-            contours,
-            contour_images: images,
-            particles,
-            ..
-        } = &mut self.pending;
-        let line_tension = self.line_tension;
-        let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
-        let vertices = contours.contours(drawing, |p, polygon, deepest| {
-            let color = seen.color(p);
-            shifts_of_polygon(domain, polygon, |shift| {
-                images.image(polygon, shift, color, p);
-            });
-            particles.particle(
-                &seen,
-                frame.positions[p],
-                deepest / radii[p],
-                line_tension,
-                p,
-            );
-            color
-        });
-        contours.end_row(step, nanoseconds);
-        images.end_row(step, nanoseconds);
-        particles.end_row();
-        self.pending.bytes += 8 * vertices + 64 * radii.len();
-    }
-
-    fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
-        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
-        let network = Network::of(&frame.positions, self.packing.radii(), contacts);
-        let domain = self.packing.domain();
-        let Pending {
-            contacts: rows,
-            contact_images: images,
-            contact_numbers: numbers,
-            ..
-        } = &mut self.pending;
-        rows.network(&network);
-        for (c, (segment, &relative)) in network.segments.iter().zip(&network.relative).enumerate()
-        {
-            shifts_of_segment(domain, segment, |shift| {
-                let single = segment.map(|v| [v.x as f32, v.y as f32]);
-                images.image(&single, shift, Network::color(relative), c);
-                images.strips.half_width(network.half_width(relative));
-            });
-        }
-        rows.end_row(step, nanoseconds);
-        images.end_row(step, nanoseconds);
-        numbers.row(contacts, self.line_tension);
-        self.pending.bytes += 40 * contacts.pairs.len();
+    /// What draws, and what writes what was drawn.
+    pub(super) fn split(self) -> (Rows, Chunks<W>) {
+        (self.rows, self.chunks)
     }
 
     /// Whether no batch is at hand.
     pub(super) fn is_empty(&self) -> bool {
-        self.pending.snapshots == 0
+        self.rows.is_empty()
     }
 
     /// Writes the batch at hand.
     pub(super) fn flush(&mut self) -> io::Result<()> {
-        let pending = core::mem::take(&mut self.pending);
-        self.pending = Pending {
-            contours: StripRows::with_room_of(&pending.contours),
-            contour_images: ImageRows::with_room_of(&pending.contour_images),
-            particles: ParticleRows::with_room_of(&pending.particles),
-            contacts: StripRows::with_room_of(&pending.contacts),
-            contact_images: ImageRows::with_room_of(&pending.contact_images),
-            contact_numbers: ContactRows::with_room_of(&pending.contact_numbers),
-            states: StateRows::with_room_of(&pending.states),
-            ..Pending::default()
-        };
-        self.write_particles(pending.contours, pending.contour_images, pending.particles)?;
-        self.write_contacts(
-            pending.contacts,
-            pending.contact_images,
-            pending.contact_numbers,
-        )?;
-        self.write_metrics(&pending.metrics)?;
-        let times = pending.states.times.clone();
-        self.write_columns("/state", &times, pending.states.into_columns()?)?;
-        self.intact = pending.last.or(self.intact);
+        self.chunks.write(self.rows.batch())
+    }
+}
+
+/// Writes batches of rows as chunks.
+pub(super) struct Chunks<W> {
+    encoder: Encoder<W>,
+    store: StoreId,
+    intact: Option<u64>,
+}
+
+impl<W: Write> Chunks<W> {
+    /// The last step that the sink holds in full.
+    pub fn intact(&self) -> Option<u64> {
+        self.intact
+    }
+
+    /// Bytes of whole messages.
+    pub fn written(&self) -> u64 {
+        self.encoder.written()
+    }
+
+    /// Writes a batch, the states last.
+    pub fn write(&mut self, batch: Batch) -> io::Result<()> {
+        self.write_particles(batch.contours, batch.contour_images, batch.particles)?;
+        self.write_contacts(batch.contacts, batch.contact_images, batch.contact_numbers)?;
+        self.write_metrics(&batch.metrics)?;
+        let times = batch.states.times.clone();
+        self.write_columns("/state", &times, batch.states.into_columns()?)?;
+        self.intact = batch.last.or(self.intact);
         Ok(())
+    }
+
+    /// Writes the outcome, unless there is none, and the end; `states` were recorded.
+    pub fn finish(
+        &mut self,
+        outcome: Option<Outcome>,
+        (states, digest): (u64, [u8; 32]),
+    ) -> io::Result<Written> {
+        if let Some(outcome) = outcome {
+            let result = DynamicArchetype::new("softjam.Result")
+                .with_component_from_data(
+                    "converged",
+                    array(BooleanArray::from(vec![outcome.converged])),
+                )
+                .with_component_from_data("steps", array(UInt64Array::from(vec![outcome.steps])))
+                .with_component_from_data("f_max", array(Float64Array::from(vec![outcome.f_max])))
+                .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())));
+            self.encoder
+                .single(&self.store, "/result", TimePoint::default(), &result)?;
+        }
+        self.encoder.finish()?;
+        Ok(Written {
+            bytes: self.encoder.written(),
+            states,
+        })
     }
 
     fn write_particles(
@@ -329,56 +249,22 @@ impl<W: Write> RrdRecorder<W> {
 impl<W: Write> Recorder for RrdRecorder<W> {
     /// Takes a snapshot, which reaches the sink with its batch.
     fn record(&mut self, snapshot: &Snapshot) -> io::Result<()> {
-        let nanoseconds = snapshot.nanoseconds;
-        if let Some(metrics) = snapshot.metrics {
-            self.pending
-                .metrics
-                .push((snapshot.step, nanoseconds, metrics));
-            self.pending.bytes += size_of::<Metrics>();
+        match self.rows.take(snapshot) {
+            Some(batch) => self.chunks.write(batch),
+            None => Ok(()),
         }
-        if let Some(frame) = &snapshot.frame {
-            self.record_frame(snapshot, frame);
-        }
-        let pending = &mut self.pending;
-        pending.snapshots += 1;
-        pending.last = Some(snapshot.step);
-        let first = *pending.first.get_or_insert(snapshot.step);
-        if pending.bytes >= BATCH_BYTES
-            || pending.snapshots >= BATCH_SNAPSHOTS
-            || snapshot.step.saturating_sub(first) >= BATCH_SPAN
-        {
-            self.flush()?;
-        }
-        Ok(())
     }
 
     fn intact(&self) -> Option<u64> {
-        self.intact
+        self.chunks.intact()
     }
 
     fn written(&self) -> u64 {
-        self.encoder.written()
+        self.chunks.written()
     }
 
     fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written> {
         self.flush()?;
-        if let Some(outcome) = outcome {
-            let digest = *self.digests.finalize().as_bytes();
-            let result = DynamicArchetype::new("softjam.Result")
-                .with_component_from_data(
-                    "converged",
-                    array(BooleanArray::from(vec![outcome.converged])),
-                )
-                .with_component_from_data("steps", array(UInt64Array::from(vec![outcome.steps])))
-                .with_component_from_data("f_max", array(Float64Array::from(vec![outcome.f_max])))
-                .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())));
-            self.encoder
-                .single(&self.store, "/result", TimePoint::default(), &result)?;
-        }
-        self.encoder.finish()?;
-        Ok(Written {
-            bytes: self.encoder.written(),
-            states: self.states,
-        })
+        self.chunks.finish(outcome, self.rows.states())
     }
 }

@@ -1,6 +1,7 @@
 //! The thread that encodes and writes, behind a bounded queue.
 
-use super::{Format, Header, McapRecorder, Outcome, RecordError, Recorder, RrdRecorder, Snapshot};
+use super::pipeline::Pipeline;
+use super::{Format, Header, McapRecorder, Outcome, RecordError, Recorder, Snapshot};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
@@ -113,7 +114,7 @@ impl Writer {
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())
             .spawn(move || match format {
-                Format::Rrd => write(file, &messages, |file| RrdRecorder::new(file, header)),
+                Format::Rrd => write(file, &messages, |file| Pipeline::new(file, header)),
                 Format::Mcap => write(file, &messages, |file| McapRecorder::new(file, header)),
             })
             .map_err(|source| RecordError::Create {

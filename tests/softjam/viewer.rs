@@ -145,6 +145,12 @@ fn what_crosses_an_edge_is_drawn_at_its_other_side_and_nothing_else() {
         "LineStrips2D:strips",
         &[[f32; 2]]
     );
+    let recorded = rows!(
+        chunks,
+        "/world/contours",
+        "LineStrips2D:strips",
+        &[[f32; 2]]
+    );
     assert_eq!(of.len(), frames.len());
     let l = packing.domain().lengths();
     let inside = |v: Vec2| v.x > 0.0 && v.x < l.x && v.y > 0.0 && v.y < l.y;
@@ -160,8 +166,16 @@ fn what_crosses_an_edge_is_drawn_at_its_other_side_and_nothing_else() {
         );
         let mut expected = Vec::new();
         for p in 0..packing.len() {
-            // Images are those of what is recorded, in single precision.
-            let polygon: Vec<Vec2> = contours.polygon(p).iter().map(|v| rounded(*v)).collect();
+            // What is recorded is the contour in single precision, and images are those of what is recorded.
+            let polygon = recorded[k][p]
+                .iter()
+                .map(|[x, y]| Vec2::new((*x).into(), (*y).into()));
+            let mut polygon: Vec<Vec2> = polygon.collect();
+            assert_eq!(polygon.pop(), polygon.first().copied(), "closed");
+            assert_eq!(polygon.len(), contours.polygon(p).len());
+            for (v, exact) in polygon.iter().zip(contours.polygon(p)) {
+                assert!((v - exact).amax() < 1.5e-6, "{v} {exact}");
+            }
             let before = expected.len();
             for shift in shifts(&packing) {
                 if polygon.iter().any(|v| inside(v + shift)) {

@@ -230,6 +230,12 @@ impl Write for Outbox {
         Ok(bytes.len())
     }
 
+    /// A message in pieces.
+    fn write_vectored(&mut self, pieces: &[io::IoSlice<'_>]) -> io::Result<usize> {
+        let pieces: Vec<&[u8]> = pieces.iter().map(|piece| &**piece).collect();
+        self.write(&pieces.concat())
+    }
+
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

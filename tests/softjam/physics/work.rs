@@ -234,7 +234,7 @@ fn run_that_starts_from_a_file_or_a_frame_relaxes_no_disks() {
 }
 
 #[test]
-fn rattlers_are_counted_again_only_when_contacts_change() {
+fn rattlers_are_counted_again_only_when_contacts_change_that_matter() {
     let mut run = Relaxation::new(&scene(64, 0.86, 1)).expect("a packing");
     let mut backbone = Backbone::default();
     let (mut changes, mut last) = (0, None);
@@ -251,7 +251,8 @@ fn rattlers_are_counted_again_only_when_contacts_change() {
         );
         run.advance().expect("a step");
     }
-    assert_eq!(backbone.counts(), changes);
+    // Most changes leave what is held as it is.
+    assert!(2 * backbone.counts() < changes, "{}", backbone.counts());
     assert!(4 * changes < run.step(), "{changes} changes");
 }
 

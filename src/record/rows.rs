@@ -1,0 +1,190 @@
+//! Rows of all entities, gathered from snapshots until they make a batch.
+
+use super::columns::StripRows;
+use super::hover::{ContactRows, ParticleRows};
+use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
+use super::pictures::{Network, Particles};
+use super::states::StateRows;
+use super::{Header, Snapshot};
+use crate::contact::{Contacts, FrameContacts};
+use crate::droplet::contour::Contours;
+use crate::force::Metrics;
+use crate::frame::Frame;
+use crate::packing::Packing;
+
+/// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
+/// is killed loses no more than a batch.
+const BATCH_BYTES: usize = 1 << 23;
+const BATCH_SNAPSHOTS: usize = 512;
+const BATCH_SPAN: u64 = 2048;
+
+/// Turns snapshots into batches of rows.
+pub(super) struct Rows {
+    packing: Packing,
+    line_tension: f64,
+    contours: Contours,
+    pending: Batch,
+    states: u64,
+    digests: blake3::Hasher,
+}
+
+/// Rows that wait to be written, by entity.
+#[derive(Default)]
+pub(super) struct Batch {
+    pub metrics: Vec<MetricRow>,
+    pub contours: StripRows,
+    pub contour_images: ImageRows,
+    pub particles: ParticleRows,
+    pub contacts: StripRows,
+    pub contact_images: ImageRows,
+    pub contact_numbers: ContactRows,
+    pub states: StateRows,
+    bytes: usize,
+    snapshots: usize,
+    first: Option<u64>,
+    /// The last step.
+    pub last: Option<u64>,
+}
+
+/// A step, its simulated time in nanoseconds and its metrics.
+pub(super) type MetricRow = (u64, i64, Metrics);
+
+impl Rows {
+    /// Of the recording that `header` begins.
+    pub fn new(header: Header) -> Self {
+        Self {
+            line_tension: header.scene.line_tension,
+            contours: Contours::new(header.scene.contours),
+            packing: header.packing,
+            pending: Batch::default(),
+            states: 0,
+            digests: blake3::Hasher::new(),
+        }
+    }
+
+    /// Adds a snapshot; the batch if that makes it whole.
+    pub fn take(&mut self, snapshot: &Snapshot) -> Option<Batch> {
+        let nanoseconds = snapshot.nanoseconds;
+        if let Some(metrics) = snapshot.metrics {
+            self.pending
+                .metrics
+                .push((snapshot.step, nanoseconds, metrics));
+            self.pending.bytes += size_of::<Metrics>();
+        }
+        if let Some(frame) = &snapshot.frame {
+            self.record_frame(snapshot, frame);
+        }
+        let pending = &mut self.pending;
+        pending.snapshots += 1;
+        pending.last = Some(snapshot.step);
+        let first = *pending.first.get_or_insert(snapshot.step);
+        let whole = pending.bytes >= BATCH_BYTES
+            || pending.snapshots >= BATCH_SNAPSHOTS
+            || snapshot.step.saturating_sub(first) >= BATCH_SPAN;
+        whole.then(|| self.batch())
+    }
+
+    /// The batch at hand, which ends with it.
+    pub fn batch(&mut self) -> Batch {
+        let next = Batch {
+            contours: StripRows::with_room_of(&self.pending.contours),
+            contour_images: ImageRows::with_room_of(&self.pending.contour_images),
+            particles: ParticleRows::with_room_of(&self.pending.particles),
+            contacts: StripRows::with_room_of(&self.pending.contacts),
+            contact_images: ImageRows::with_room_of(&self.pending.contact_images),
+            contact_numbers: ContactRows::with_room_of(&self.pending.contact_numbers),
+            states: StateRows::with_room_of(&self.pending.states),
+            ..Batch::default()
+        };
+        core::mem::replace(&mut self.pending, next)
+    }
+
+    /// Whether no batch is at hand.
+    pub fn is_empty(&self) -> bool {
+        self.pending.snapshots == 0
+    }
+
+    /// How many states were recorded so far, and the digest of their digests.
+    pub fn states(&self) -> (u64, [u8; 32]) {
+        (self.states, *self.digests.finalize().as_bytes())
+    }
+
+    fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
+        if snapshot.contours || snapshot.contacts {
+            let contacts = FrameContacts::of(&self.packing, frame);
+            if snapshot.contours {
+                self.draw_particles(snapshot, frame, &contacts.view());
+            }
+            if snapshot.contacts {
+                self.draw_contacts(snapshot, frame, &contacts.view());
+            }
+        }
+        if snapshot.state {
+            let digest = frame.digest();
+            self.digests.update(&digest);
+            self.states += 1;
+            self.pending
+                .states
+                .row(snapshot.nanoseconds, frame, &digest);
+            self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
+        }
+    }
+
+    fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let (domain, radii) = (self.packing.domain(), self.packing.radii());
+        let seen = Particles::of(radii, contacts);
+        let Batch {
+            contours,
+            contour_images: images,
+            particles,
+            ..
+        } = &mut self.pending;
+        let line_tension = self.line_tension;
+        let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
+        let vertices = contours.contours(drawing, |p, polygon, extent| {
+            let (color, centre) = (seen.color(p), frame.positions[p]);
+            if !is_within(domain, centre, extent.reach) {
+                shifts_of_polygon(domain, polygon, |shift| {
+                    images.image(polygon, shift, color, p);
+                });
+            }
+            particles.particle(
+                (&seen, p),
+                (centre, color),
+                extent.deepest / radii[p],
+                line_tension,
+            );
+            color
+        });
+        contours.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        particles.end_row();
+        self.pending.bytes += 8 * vertices + 64 * radii.len();
+    }
+
+    fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+        let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
+        let network = Network::of(&frame.positions, self.packing.radii(), contacts);
+        let domain = self.packing.domain();
+        let Batch {
+            contacts: rows,
+            contact_images: images,
+            contact_numbers: numbers,
+            ..
+        } = &mut self.pending;
+        rows.network(&network);
+        for (c, (segment, &relative)) in network.segments.iter().zip(&network.relative).enumerate()
+        {
+            shifts_of_segment(domain, segment, |shift| {
+                let single = segment.map(|v| [v.x as f32, v.y as f32]);
+                images.image(&single, shift, Network::color(relative), c);
+                images.strips.half_width(network.half_width(relative));
+            });
+        }
+        rows.end_row(step, nanoseconds);
+        images.end_row(step, nanoseconds);
+        numbers.row(contacts, self.line_tension);
+        self.pending.bytes += 40 * contacts.pairs.len();
+    }
+}
