@@ -369,10 +369,11 @@ impl ContactLaw {
     /// that there are. Neither touches the rest of the structure.
     pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
-        let exchanged = &self.offending[..count];
         let mut came: Vec<([u32; 2], f64)> = Vec::new();
-        for offence in exchanged {
-            match *offence {
+        for at in 0..count {
+            let offence = self.offending[at];
+            self.note(offence.pair(), matches!(offence, Offence::Add(..)));
+            match offence {
                 Offence::Drop(contact, _) => {
                     self.forces[contact] = 0.0;
                     self.at_rest.push(contact as u32);

@@ -74,6 +74,10 @@ pub struct ContactLaw {
     pub(super) at_rest: Vec<u32>,
     /// Contacts that came since the structure was built.
     pub(super) added: Vec<[u32; 2]>,
+    /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
+    /// and is called now.
+    pub(super) changes: Vec<([u32; 2], bool)>,
+    pub(super) sets: (u64, u64),
     /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
     pub(super) structured: bool,
     pub(super) refreshed: bool,
@@ -165,6 +169,8 @@ impl ContactLaw {
             forces: Vec::new(),
             at_rest: Vec::new(),
             added: Vec::new(),
+            changes: Vec::new(),
+            sets: (0, 0),
             structured: false,
             refreshed: false,
             present: OnceLock::new(),
@@ -244,8 +250,25 @@ impl ContactLaw {
         }
     }
 
+    /// What came (`true`) and went in the last solution, one after the other.
+    pub(crate) fn changes(&self) -> &[([u32; 2], bool)] {
+        &self.changes
+    }
+
+    /// What the set of contacts was called before the last solution and is called now: the same set has the same name, and
+    /// another has another but for one in 2⁶⁴.
+    pub(crate) fn sets(&self) -> (u64, u64) {
+        self.sets
+    }
+
+    /// Takes note of a contact that comes or goes.
+    pub(super) fn note(&mut self, pair: [u32; 2], came: bool) {
+        self.changes.push((pair, came));
+        self.sets.1 ^= name(pair);
+    }
+
     /// Number of contacts.
-    pub(super) fn contact_count(&self) -> usize {
+    pub(crate) fn contact_count(&self) -> usize {
         self.pairs.len() - self.at_rest.len()
     }
 
@@ -311,7 +334,11 @@ impl ContactLaw {
             self.added.clear();
             self.bulges.forget();
             (self.structured, self.parted) = (false, false);
+            let set = pairs.iter().fold(0, |set, pair| set ^ name(*pair));
+            self.sets = (set, set);
         }
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
         self.forces.clear();
         self.forces.extend_from_slice(forces);
     }
@@ -410,6 +437,8 @@ impl ContactLaw {
         moved: f64,
     ) -> Result<(), ContactError> {
         self.present.take();
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
         self.refreshed = false;
         self.moved += moved;
         self.slack = slack(packing, f_max);
@@ -466,6 +495,15 @@ impl ContactLaw {
     pub(super) fn allowed(&self, scale: f64) -> f64 {
         scale * relative_tolerance(self.tolerance, self.slack, scale)
     }
+}
+
+/// A pair's part in the name of a set of contacts: the finalizer of SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA
+/// 2014).
+fn name([i, j]: [u32; 2]) -> u64 {
+    let mut x = (u64::from(i) << 32 | u64::from(j)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Rattlers and the backbone: which particles are held by their contacts.
 
-use crate::contact::Contacts;
+use crate::contact::{ContactLaw, Contacts};
 use crate::wide::wide;
 
 /// Rattlers, and the contacts left among the other particles: particles with fewer than three contacts are taken away
@@ -65,8 +65,10 @@ pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Backbone {
-    /// The contacts of the frame before that bore a force.
-    pairs: Vec<[u32; 2]>,
+    /// The contacts of the frame before that bore a force, where they are known by their pairs.
+    pairs: Option<Vec<[u32; 2]>>,
+    /// What a [`ContactLaw`] calls the set of them, where they are known by that.
+    set: Option<u64>,
     /// Contacts of each particle.
     all: Vec<u32>,
     /// Contacts of each particle that is held with others that are; below 3 where it is not held.
@@ -100,6 +102,7 @@ impl Backbone {
         contacts: &Contacts<'_>,
         touching: usize,
     ) -> (usize, usize) {
+        self.set = None;
         if touching == contacts.pairs.len() {
             self.follow(particles, contacts.pairs);
         } else {
@@ -110,50 +113,99 @@ impl Backbone {
         (self.rattlers, self.contacts)
     }
 
+    /// [`count`](Self::count) of the contacts of `law`, of which `touching` bear a force. Behind each of its solutions it is
+    /// told only what has come and gone.
+    pub(super) fn count_law(
+        &mut self,
+        particles: usize,
+        law: &ContactLaw,
+        touching: usize,
+    ) -> (usize, usize) {
+        let all_touch = touching == law.contact_count();
+        let (before, after) = law.sets();
+        if !all_touch || particles != self.all.len() || ![before, after].map(Some).contains(&self.set)
+        {
+            self.count_touching(particles, &law.contacts(), touching);
+        } else if self.set != Some(after) {
+            let mut stays = true;
+            for &(pair, came) in law.changes() {
+                stays &= self.change(pair, came);
+            }
+            if self.is_closed() && stays {
+                self.pairs = None;
+            } else {
+                self.count_anew(particles, law.contacts().pairs);
+            }
+        }
+        self.set = all_touch.then_some(after);
+        (self.rattlers, self.contacts)
+    }
+
     /// Goes on to `pairs`.
     fn follow(&mut self, particles: usize, pairs: &[[u32; 2]]) {
-        let mut stays = particles == self.all.len();
-        let mut same = true;
-        if stays {
-            self.open.clear();
-            let (all, held) = (&mut self.all, &mut self.held);
-            differences(&self.pairs, pairs, |pair, came| {
+        if particles == self.all.len()
+            && let Some(old) = self.pairs.take()
+        {
+            let (mut stays, mut same) = (true, true);
+            differences(&old, pairs, |pair, came| {
                 same = false;
-                let [i, j] = pair.map(|p| p as usize);
-                let both = held[i] >= 3 && held[j] >= 3;
-                for p in [i, j] {
-                    let change = |n: &mut u32| *n = if came { *n + 1 } else { *n - 1 };
-                    change(&mut all[p]);
-                    if both {
-                        change(&mut held[p]);
-                        stays &= held[p] >= 3;
-                    }
-                }
-                match (both, came) {
-                    (true, true) => self.contacts += 1,
-                    (true, false) => self.contacts -= 1,
-                    (false, true) => self.open.push(pair),
-                    (false, false) => {}
-                }
+                stays &= self.change(pair, came);
             });
-            let weak = |p: u32| held[p as usize] < 3 && all[p as usize] < 3;
-            stays &= self.open.iter().all(|&[i, j]| weak(i) || weak(j));
-        }
-        if stays && same {
-            return;
-        }
-        if !stays {
-            self.all.clear();
-            self.all.resize(particles, 0);
-            for p in pairs.as_flattened() {
-                self.all[*p as usize] += 1;
+            if self.is_closed() && stays {
+                let mut old = old;
+                if !same {
+                    old.clear();
+                    old.extend_from_slice(pairs);
+                }
+                self.pairs = Some(old);
+                return;
             }
-            (self.held, self.contacts) = held_contacts(particles, pairs);
-            self.rattlers = self.held.iter().filter(|n| **n < 3).count();
-            self.counts += 1;
         }
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
+        self.count_anew(particles, pairs);
+    }
+
+    /// A contact has come, or is gone; says whether the particles that are held keep three contacts each.
+    fn change(&mut self, pair: [u32; 2], came: bool) -> bool {
+        let [i, j] = pair.map(|p| p as usize);
+        let both = self.held[i] >= 3 && self.held[j] >= 3;
+        let mut stays = true;
+        for p in [i, j] {
+            let change = |n: &mut u32| *n = if came { *n + 1 } else { n.saturating_sub(1) };
+            change(&mut self.all[p]);
+            if both {
+                change(&mut self.held[p]);
+                stays &= self.held[p] >= 3;
+            }
+        }
+        match (both, came) {
+            (true, true) => self.contacts += 1,
+            (true, false) => self.contacts -= 1,
+            (false, true) => self.open.push(pair),
+            (false, false) => {}
+        }
+        stays
+    }
+
+    /// Whether none of the contacts that came could belong to a larger set that is held.
+    fn is_closed(&mut self) -> bool {
+        let (all, held) = (&self.all, &self.held);
+        let weak = |p: u32| held[p as usize] < 3 && all[p as usize] < 3;
+        let closed = self.open.iter().all(|&[i, j]| weak(i) || weak(j));
+        self.open.clear();
+        closed
+    }
+
+    fn count_anew(&mut self, particles: usize, pairs: &[[u32; 2]]) {
+        self.all.clear();
+        self.all.resize(particles, 0);
+        for p in pairs.as_flattened() {
+            self.all[*p as usize] += 1;
+        }
+        (self.held, self.contacts) = held_contacts(particles, pairs);
+        self.rattlers = self.held.iter().filter(|n| **n < 3).count();
+        self.counts += 1;
+        self.open.clear();
+        self.pairs = Some(pairs.to_vec());
     }
 
     /// How often it was counted anew so far: a count of work.

@@ -50,15 +50,18 @@
 
 mod backbone;
 mod form;
+mod sums;
 pub(crate) mod turning;
 
 pub use backbone::{Backbone, backbone, held};
 pub(crate) use form::tangent;
 pub use form::{Form, NetForces};
 
-use crate::contact::Contacts;
+use crate::contact::{ContactLaw, Contacts};
 use crate::domain::{Domain, Vec2};
+use crate::packing::Packing;
 use crate::wide::wide;
+use sums::Sums;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
 ///
@@ -254,23 +257,38 @@ impl Observables {
         (f_max, dt): (f64, f64),
         backbone: &mut Backbone,
     ) -> Self {
-        let mut o = Self {
-            particles,
-            f_max,
-            dt,
-            ..Self::default()
-        };
-        let sums = Sums::of(contacts);
-        o.energy = 0.5 * total(sums.work);
-        o.stress = sums.moments.map(|chains| 0.0 - total(chains));
-        o.contacts = total(sums.touching) as usize;
-        o.energy /= line_tension;
-        for s in &mut o.stress {
-            *s /= domain.area() * line_tension;
-        }
+        let mut o = Self::summed(contacts, domain, line_tension);
+        (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
         (o.rattlers, o.backbone_contacts) =
             backbone.count_touching(particles, contacts, o.contacts);
         o
+    }
+
+    /// [`counted`](Self::counted) with the contacts that `law` found last: the same bits, and the contacts need not be put in
+    /// order for it.
+    pub(crate) fn of_law(
+        law: &ContactLaw,
+        packing: &Packing,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
+        let particles = packing.len();
+        let mut o = Self::summed(&law.numbered(), packing.domain(), law.line_tension());
+        (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
+        (o.rattlers, o.backbone_contacts) = backbone.count_law(particles, law, o.contacts);
+        o
+    }
+
+    /// What is summed over contacts, in whatever order.
+    fn summed(contacts: &Contacts<'_>, domain: Domain, line_tension: f64) -> Self {
+        let sums = Sums::of(contacts);
+        let scale = domain.area() * line_tension;
+        Self {
+            energy: 0.5 * sums.work / line_tension,
+            stress: sums.moments.map(|sum| (0.0 - sum) / scale),
+            contacts: sums.touching,
+            ..Self::default()
+        }
     }
 
     /// These observables with the stress of the torques added: `σ_αβ −= (1/V) Σ_c τ_c ½ (t_α n_β + t_β n_α)`, with `t` the
@@ -359,59 +377,6 @@ impl Observables {
     pub fn coordination(&self) -> f64 {
         mean_coordination(self.backbone_contacts, self.particles - self.rattlers)
     }
-}
-
-/// Sums over contacts, each in eight chains: contact `c` belongs to chain `c mod 8`, and the chains are added in turn.
-#[derive(Default)]
-struct Sums {
-    /// `Σ_c δ_c f_c` (force·length).
-    work: [f64; 8],
-    /// `Σ_c f_c r_c n_α n_β` for xx, xy and yy (force·length).
-    moments: [[f64; 8]; 3],
-    /// Number of contacts with `f > 0`.
-    touching: [f64; 8],
-}
-
-impl Sums {
-    fn of(contacts: &Contacts<'_>) -> Self {
-        wide(
-            #[inline(always)]
-            || Self::of_all(contacts),
-        )
-    }
-
-    #[inline(always)]
-    fn of_all(contacts: &Contacts<'_>) -> Self {
-        let mut sums = Self::default();
-        let (forces, last_forces) = contacts.forces.as_chunks::<8>();
-        let (normals, last_normals) = contacts.normals.as_chunks::<8>();
-        let (distances, last_distances) = contacts.distances.as_chunks::<8>();
-        let (overlaps, last_overlaps) = contacts.overlaps.as_chunks::<8>();
-        for (((f, n), r), o) in forces.iter().zip(normals).zip(distances).zip(overlaps) {
-            for k in 0..8 {
-                sums.add(k, (f[k], n[k], r[k], o[k]));
-            }
-        }
-        for (k, &f) in last_forces.iter().enumerate() {
-            sums.add(k, (f, last_normals[k], last_distances[k], last_overlaps[k]));
-        }
-        sums
-    }
-
-    /// Adds a contact, by force, normal, distance and overlap, to the chain `k`.
-    #[inline(always)]
-    fn add(&mut self, k: usize, (f, n, distance, overlap): (f64, Vec2, f64, f64)) {
-        let moment = f * distance;
-        self.work[k] += overlap * f;
-        self.moments[0][k] += moment * n.x * n.x;
-        self.moments[1][k] += moment * n.x * n.y;
-        self.moments[2][k] += moment * n.y * n.y;
-        self.touching[k] += if f > 0.0 { 1.0 } else { 0.0 };
-    }
-}
-
-fn total(chains: [f64; 8]) -> f64 {
-    chains.into_iter().sum()
 }
 
 /// `Z = 2 N_c / N` of `held` particles with `contacts` among them; 0 where there is none.

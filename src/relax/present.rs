@@ -118,15 +118,12 @@ impl Relaxation {
     ///
     /// See the example of [`Backbone`].
     pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
-        Observables::counted(
-            &self.law.contacts(),
-            self.packing.domain(),
-            self.packing.len(),
-            self.law.line_tension(),
-            (self.f_max, self.state.dt),
-            backbone,
-        )
-        .with_torques(
+        let f_max_and_dt = (self.f_max, self.state.dt);
+        let o = Observables::of_law(&self.law, &self.packing, f_max_and_dt, backbone);
+        if self.form.torques().is_empty() {
+            return o;
+        }
+        o.with_torques(
             &self.law.contacts(),
             self.packing.domain(),
             self.law.line_tension(),
