@@ -214,10 +214,10 @@ impl CellList {
                 .map(|(from, to)| self.first[from] as usize..self.first[to] as usize);
             let here = self.first[cell] as usize..self.first[cell + 1] as usize;
             let most: usize = ahead.iter().map(ExactSizeIterator::len).sum();
-            if self.found.len() < count + here.len() * most {
-                self.found.resize(count + here.len() * most, [0; 2]);
-            }
             for k in here {
+                if self.found.len() < count + most {
+                    self.found.resize(2 * (count + most), [0; 2]);
+                }
                 let seat = self.seats[k];
                 ahead[0].start = k + 1;
                 for others in &ahead {
