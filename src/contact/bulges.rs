@@ -59,7 +59,9 @@ impl Bulges {
         per_radius: f64,
     ) {
         self.age = self.age.saturating_add(1);
-        if self.age > LONGEST || self.bound.len() != radii.len() || forces.len() < self.counted.len()
+        if self.age > LONGEST
+            || self.bound.len() != radii.len()
+            || forces.len() < self.counted.len()
         {
             let sum: f64 = forces.iter().map(|f| f.abs()).sum();
             self.spare = SPARE * sum / forces.len().max(1) as f64;
@@ -174,7 +176,11 @@ mod tests {
             let force = |c: usize| {
                 let wave = libm::sin(0.37 * c as f64 + 0.021 * f64::from(step));
                 // Most grow and shrink, some are at rest, some pull.
-                if c % 7 == 3 { 0.0 } else { 0.2 + wave.max(-0.3) }
+                if c % 7 == 3 {
+                    0.0
+                } else {
+                    0.2 + wave.max(-0.3)
+                }
             };
             let forces: Vec<f64> = (0..pairs.len()).map(force).collect();
             bulges.bound(&pairs, &forces, &radii, 0.16);
@@ -193,7 +199,10 @@ mod tests {
             }
         }
         assert!(sums < 10, "summed {sums} times");
-        assert!(numbers < 400 * 40 / 10, "{numbers} bounds are much too wide");
+        assert!(
+            numbers < 400 * 40 / 10,
+            "{numbers} bounds are much too wide"
+        );
         bulges.bound(&pairs, &vec![f64::NAN; pairs.len()], &radii, 0.16);
         assert!(bulges.largest().is_nan());
         assert_eq!(bulges.cut(1.0).map(|first| first.0), Some(0));

@@ -250,7 +250,8 @@ impl ContactLaw {
         let widest = WIDEST_BULGE * packing.largest_radius();
         let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
-        self.bulges.bound(pairs, forces, packing.radii(), per_radius);
+        self.bulges
+            .bound(pairs, forces, packing.radii(), per_radius);
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         self.absurd = None;
         if self.bulges.largest().is_nan() || self.bulges.largest() > widest {

@@ -63,13 +63,21 @@ pub(super) fn fill<const Z: usize, const T: usize>(
 /// [`fill`] of blocks of any size.
 #[inline(always)]
 pub(super) fn fill_blocks(size: usize, blocks: Blocks<'_>, scales: impl Iterator<Item = f64>) {
+    let Blocks {
+        toward,
+        ends,
+        values,
+        scaled,
+        scaling,
+        forces,
+        products,
+    } = blocks;
     let pairs = size * (size - 1) / 2;
-    let values = blocks.values.chunks_exact_mut(pairs);
-    let values = values.zip(blocks.scaled.chunks_exact_mut(pairs));
-    let ends = blocks.ends.chunks_exact(size);
-    let ends = ends.zip(blocks.toward.chunks_exact(size));
+    let values = values.chunks_exact_mut(pairs);
+    let values = values.zip(scaled.chunks_exact_mut(pairs));
+    let ends = ends.chunks_exact(size).zip(toward.chunks_exact(size));
     for (((ends, toward), scale), (values, scaled)) in ends.zip(scales).zip(values) {
-        let by = |e: u32| blocks.scaling[(e >> 1) as usize];
+        let by = |e: u32| scaling[(e >> 1) as usize];
         let mut columns = values.iter_mut().zip(scaled);
         for b in 1..size {
             for (a, (value, scaled)) in (0..b).zip(&mut columns) {
@@ -77,6 +85,6 @@ pub(super) fn fill_blocks(size: usize, blocks: Blocks<'_>, scales: impl Iterator
                 *scaled = (*value * (by(ends[a]) * by(ends[b]))) as f32;
             }
         }
-        product_of_blocks(size, ends, values, blocks.forces, blocks.products);
+        product_of_blocks(size, ends, values, forces, products);
     }
 }

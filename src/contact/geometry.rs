@@ -205,7 +205,11 @@ impl Geometry {
             angle: self.angles[c],
         };
         let from_higher = from_lower.opposite();
-        if end & 1 == 0 { from_lower } else { from_higher }
+        if end & 1 == 0 {
+            from_lower
+        } else {
+            from_higher
+        }
     }
 
     /// The contacts of particle `p` with their partners and directions, in the order of the partners.
@@ -264,7 +268,8 @@ mod tests {
     fn contacts_added_have_the_bits_of_contacts_that_were_there() {
         let points = [(1.0, 1.0), (1.9, 1.3), (2.6, 1.9), (1.2, 1.9), (7.7, 0.8)];
         let positions = points.map(|(x, y)| Vec2::new(x, y)).to_vec();
-        let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.6; 5], positions).unwrap();
+        let packing =
+            Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.6; 5], positions).unwrap();
         let all = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 3]];
         let whole = Geometry::of(&packing, &ContactList::new(5, &all).unwrap());
         for late in [[0, 4], [0, 1], [1, 2]] {

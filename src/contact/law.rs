@@ -1,17 +1,14 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 
-use super::Contacts;
 use super::bulges::Bulges;
 use super::complementarity::Offence;
 use super::error::ContactError;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
-use super::present::Present;
 use super::patch::Patch;
+use super::present::{Present, name_of};
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
-use crate::domain::Vec2;
-use crate::force::net_forces;
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
 use std::sync::OnceLock;
@@ -193,95 +190,6 @@ impl ContactLaw {
         }
     }
 
-    /// The contacts and forces found last.
-    ///
-    /// ```
-    /// assert!(softjam::contact::ContactLaw::default().contacts().forces.is_empty());
-    /// ```
-    #[must_use]
-    pub fn contacts(&self) -> Contacts<'_> {
-        if self.is_in_order() {
-            self.numbered()
-        } else {
-            self.present().contacts()
-        }
-    }
-
-    /// The contacts in the order of their numbers, those at rest among them with no force.
-    pub(crate) fn numbered(&self) -> Contacts<'_> {
-        Contacts {
-            pairs: &self.pairs,
-            normals: self.geometry.normals(),
-            distances: self.geometry.distances(),
-            overlaps: self.geometry.overlaps(),
-            forces: &self.forces,
-        }
-    }
-
-    /// The matrix `A` of the contacts found last.
-    ///
-    /// ```
-    /// assert!(softjam::contact::ContactLaw::default().matrix().is_empty());
-    /// ```
-    #[must_use]
-    pub fn matrix(&self) -> &ContactMatrix {
-        if self.is_in_order() {
-            &self.matrix
-        } else {
-            self.present().matrix(&self.matrix)
-        }
-    }
-
-    /// The net force on each particle into `net`, `F_i = Σ_j f_ij n_ij` (force), summed in the order of its partners: the bits
-    /// of [`net_forces`] with [`contacts`](Self::contacts).
-    pub(crate) fn sum_forces(&self, net: &mut [Vec2]) {
-        let numbered = self.numbered();
-        net_forces(&numbered, net);
-        // A contact that came late is at the end of the numbers, and not in its place.
-        for &p in self.added.as_flattened() {
-            let duplicate = self.geometry.duplicate();
-            let partners = duplicate.partners(p as usize).iter();
-            let mut sum = Vec2::zeros();
-            for (&q, &c) in partners.zip(duplicate.contacts(p as usize)) {
-                let force = numbered.normals[c as usize] * numbered.forces[c as usize];
-                sum += if p < q { force } else { -force };
-            }
-            net[p as usize] = sum;
-        }
-    }
-
-    /// What came (`true`) and went in the last solution, one after the other.
-    pub(crate) fn changes(&self) -> &[([u32; 2], bool)] {
-        &self.changes
-    }
-
-    /// What the set of contacts was called before the last solution and is called now: the same set has the same name, and
-    /// another has another but for one in 2⁶⁴.
-    pub(crate) fn sets(&self) -> (u64, u64) {
-        self.sets
-    }
-
-    /// Takes note of a contact that comes or goes.
-    pub(super) fn note(&mut self, pair: [u32; 2], came: bool) {
-        self.changes.push((pair, came));
-        self.sets.1 ^= name(pair);
-    }
-
-    /// Number of contacts.
-    pub(crate) fn contact_count(&self) -> usize {
-        self.pairs.len() - self.at_rest.len()
-    }
-
-    /// Whether the numbers of the contacts are their places in the order of pairs, and all are in contact.
-    pub(super) fn is_in_order(&self) -> bool {
-        self.at_rest.is_empty() && self.added.is_empty()
-    }
-
-    fn present(&self) -> &Present {
-        self.present
-            .get_or_init(|| Present::of(&self.numbered(), &self.matrix))
-    }
-
     /// Line tension γ (force).
     ///
     /// ```
@@ -334,7 +242,7 @@ impl ContactLaw {
             self.added.clear();
             self.bulges.forget();
             (self.structured, self.parted) = (false, false);
-            let set = pairs.iter().fold(0, |set, pair| set ^ name(*pair));
+            let set = name_of(pairs);
             self.sets = (set, set);
         }
         self.changes.clear();
@@ -495,15 +403,6 @@ impl ContactLaw {
     pub(super) fn allowed(&self, scale: f64) -> f64 {
         scale * relative_tolerance(self.tolerance, self.slack, scale)
     }
-}
-
-/// A pair's part in the name of a set of contacts: the finalizer of SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA
-/// 2014).
-fn name([i, j]: [u32; 2]) -> u64 {
-    let mut x = (u64::from(i) << 32 | u64::from(j)).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
 }
 
 #[cfg(test)]

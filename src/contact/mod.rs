@@ -20,6 +20,7 @@
 //! [`ContactLaw`] is what the rest of the crate sees: positions in, contacts and forces out. A second law would be
 //! added behind it.
 
+mod blocks;
 mod bulges;
 pub mod complementarity;
 mod error;

@@ -215,8 +215,7 @@ impl Patch {
         for c in self.reached.drain(..) {
             self.left_of[c as usize] = 0.0;
         }
-        self.left_of
-            .truncate(self.left_of.len() - self.added.len());
+        self.left_of.truncate(self.left_of.len() - self.added.len());
         for c in self.gone.drain(..) {
             self.place[c as usize] = NOWHERE;
         }

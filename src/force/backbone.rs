@@ -123,7 +123,9 @@ impl Backbone {
     ) -> (usize, usize) {
         let all_touch = touching == law.contact_count();
         let (before, after) = law.sets();
-        if !all_touch || particles != self.all.len() || ![before, after].map(Some).contains(&self.set)
+        if !all_touch
+            || particles != self.all.len()
+            || ![before, after].map(Some).contains(&self.set)
         {
             self.count_touching(particles, &law.contacts(), touching);
         } else if self.set != Some(after) {
@@ -224,7 +226,6 @@ fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2]
         let same = common(old, new);
         (old, new) = (&old[same..], &new[same..]);
         match (old.split_first(), new.split_first()) {
-            (None, None) => return,
             (_, Some((came, rest))) if old.first().is_none_or(|gone| came < gone) => {
                 each(*came, true);
                 new = rest;
@@ -233,7 +234,7 @@ fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2]
                 each(*gone, false);
                 old = rest;
             }
-            (None, Some(_)) => return,
+            (None, _) => return,
         }
     }
 }

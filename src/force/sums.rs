@@ -39,7 +39,7 @@ impl Sums {
         each(forces.len(), |k, c| {
             let f: f64 = forces[c];
             touching[k] += if f > 0.0 { 1.0 } else { 0.0 };
-            bearing[k] += if f != 0.0 { 1.0 } else { 0.0 };
+            bearing[k] += if f == 0.0 { 0.0 } else { 1.0 };
             most_moment[k] = larger(most_moment[k], (f * distances[c]).abs());
             most_work[k] = larger(most_work[k], (f * overlaps[c]).abs());
         });

@@ -169,11 +169,7 @@ impl ConjugateGradient {
     }
 
     /// [`true_residual`](Self::true_residual) with the products of the off-diagonal entries given.
-    fn residual_of(
-        &mut self,
-        matrix: &ContactMatrix,
-        columns: (&[f64], &[f64], &[f64]),
-    ) -> f64 {
+    fn residual_of(&mut self, matrix: &ContactMatrix, columns: (&[f64], &[f64], &[f64])) -> f64 {
         wide(
             #[inline(always)]
             || subtract(&mut self.residual, matrix, columns),

@@ -158,7 +158,7 @@ fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)
                 largest[k] = largest[k].max(magnitude(q[k]));
             }
         }
-        total += products.total(sums, q16.len());
+        total += sum_of(sums, q16.len());
         for (q, p) in q_rest.iter_mut().zip(p_rest) {
             *q += p;
             total += i64::from(products.integer(*p, *q));
@@ -199,7 +199,7 @@ fn advance(
                 largest[k] = largest[k].max(magnitude(r[k]));
             }
         }
-        total += products.total(sums, r16.len());
+        total += sum_of(sums, r16.len());
         let rest = u_rest.iter_mut().zip(r_rest).zip(p_rest.iter().zip(q_rest));
         for ((u, r), (p, q)) in rest {
             *u += alpha * p;
@@ -285,18 +285,18 @@ impl Products {
         chain.wrapping_add(self.bits(x, y))
     }
 
-    /// The sum of chains of `length` products.
-    #[inline(always)]
-    fn total(self, chains: [u32; CHAINS], length: usize) -> i64 {
-        let added = NONE.wrapping_mul(length as u32);
-        let chain = |sum: u32| i64::from(sum.wrapping_sub(added).cast_signed());
-        chains.into_iter().map(chain).sum()
-    }
-
     #[inline(always)]
     fn value(self, total: i64) -> f64 {
         total as f64 / f64::from(self.scale)
     }
+}
+
+/// The sum of chains of `length` products each.
+#[inline(always)]
+fn sum_of(chains: [u32; CHAINS], length: usize) -> i64 {
+    let added = NONE.wrapping_mul(length as u32);
+    let chain = |sum: u32| i64::from(sum.wrapping_sub(added).cast_signed());
+    chains.into_iter().map(chain).sum()
 }
 
 #[cfg(test)]

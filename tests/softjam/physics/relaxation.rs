@@ -168,7 +168,10 @@ fn numbers_of_contacts_reach_no_bit() {
         assert_eq!(run.observables(), again.observables());
     }
     let structures = run.law().work().structures;
-    assert!(exchanges > 100 && structures < 40, "{exchanges}, {structures}");
+    assert!(
+        exchanges > 100 && structures < 40,
+        "{exchanges}, {structures}"
+    );
 }
 
 #[test]

@@ -1,0 +1,285 @@
+//! Where the blocks of a [`ContactMatrix`] are, and how contacts come and go without a new structure.
+
+use super::list::{ContactList, DuplicateContactList};
+use super::matrix::{ContactMatrix, Geometry};
+use crate::droplet::kernel::G_AT_CONTACT;
+use crate::packing::Packing;
+use crate::wide::wide;
+use core::f64::consts::PI;
+use core::ops::Range;
+
+/// Blocks of `size` contacts, one after the other in each of the columns, and where they begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Run {
+    pub(super) size: usize,
+    pub(super) count: usize,
+    pub(super) block: usize,
+    pub(super) end: usize,
+    pub(super) value: usize,
+}
+
+impl Run {
+    fn of(size: usize, count: usize) -> Self {
+        Self {
+            size,
+            count,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn ends(&self) -> Range<usize> {
+        self.end..self.end + self.size * self.count
+    }
+
+    pub(super) fn values(&self) -> Range<usize> {
+        self.value..self.value + pairs_of(self.size) * self.count
+    }
+
+    /// The ends and the values of one block.
+    pub(super) fn block(&self, place: usize) -> (Range<usize>, Range<usize>) {
+        let pairs = pairs_of(self.size);
+        let (end, value) = (self.end + self.size * place, self.value + pairs * place);
+        (end..end + self.size, value..value + pairs)
+    }
+}
+
+/// Number of pairs of `z` contacts.
+pub(super) const fn pairs_of(z: usize) -> usize {
+    z * (z - 1) / 2
+}
+
+/// The block of a particle without a contact.
+const NO_BLOCK: u32 = u32::MAX;
+
+/// Particles whose blocks are sorted by size together.
+const STRETCH: usize = 256;
+
+/// Blocks with more contacts than this share one stretch and have a run each.
+const LARGEST_SORTED: usize = 7;
+
+impl ContactMatrix {
+    /// Everything that depends on which particles touch, and not on where they are.
+    pub(crate) fn restructure(
+        &mut self,
+        packing: &Packing,
+        contacts: &ContactList,
+        duplicate: &DuplicateContactList,
+        line_tension: f64,
+    ) {
+        let compliance = |sum: f64| -G_AT_CONTACT / (2.0 * PI * line_tension) * sum;
+        let radii = packing.radii();
+        self.diagonal.clear();
+        self.pairs.clear();
+        self.pairs.extend(contacts.pairs());
+        for [i, j] in contacts.pairs() {
+            self.diagonal
+                .push(compliance(radii[i as usize] + radii[j as usize]));
+        }
+        self.largest_root = compliance(2.0 * packing.largest_radius()).sqrt();
+        self.scaling.resize(contacts.len(), 0.0);
+        wide(
+            #[inline(always)]
+            || {
+                for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
+                    *scaling = root_of_inverse(*compliance);
+                }
+            },
+        );
+        self.lay_out(duplicate);
+    }
+
+    /// Places for the blocks.
+    fn lay_out(&mut self, duplicate: &DuplicateContactList) {
+        self.changed = false;
+        self.sort_blocks(duplicate);
+        self.block_of.clear();
+        self.block_of.resize(duplicate.particles(), NO_BLOCK);
+        self.end.clear();
+        for (block, &p) in self.particle.iter().enumerate() {
+            self.block_of[p as usize] = block as u32;
+            self.end.extend(ends(duplicate, p));
+        }
+        let (mut block, mut end, mut value) = (0, 0, 0);
+        for run in &mut self.runs {
+            (run.block, run.end, run.value) = (block, end, value);
+            block += run.count;
+            (end, value) = (run.ends().end, run.values().end);
+        }
+        self.value.resize(value, 0.0);
+        self.scaled.resize(value, 0.0);
+    }
+
+    /// Adds one more contact, with the next number: `geometry` has it already. Its particles' blocks move to the end.
+    pub(crate) fn add(
+        &mut self,
+        packing: &Packing,
+        geometry: &Geometry,
+        pair: [u32; 2],
+        line_tension: f64,
+    ) {
+        self.changed = true;
+        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let radii = packing.radii();
+        let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
+        let compliance = -G_AT_CONTACT * per_radius * sum;
+        self.pairs.push(pair);
+        self.diagonal.push(compliance);
+        self.scaling.push(root_of_inverse(compliance));
+        for p in pair {
+            self.remove_block(p);
+            let run = Run {
+                size: geometry.duplicate().entries(p as usize).len(),
+                count: 1,
+                block: self.particle.len(),
+                end: self.end.len(),
+                value: self.value.len(),
+            };
+            self.block_of[p as usize] = run.block as u32;
+            self.particle.push(p);
+            self.end.extend(ends(geometry.duplicate(), p));
+            self.value.resize(run.values().end, 0.0);
+            self.scaled.resize(run.values().end, 0.0);
+            self.runs.push(run);
+            // The scaled values follow.
+            let ends = &self.end[run.ends()];
+            let scale = -radii[p as usize] * per_radius;
+            let couples = (1..ends.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+            for (value, (a, b)) in self.value[run.values()].iter_mut().zip(couples) {
+                let toward = geometry.toward(ends[a]);
+                *value = scale * toward.g_between(geometry.toward(ends[b]));
+            }
+        }
+        self.stale = true;
+    }
+
+    /// The run that the block of particle `p` is in, and its place there.
+    pub(super) fn place_of(&self, p: u32) -> Option<(usize, usize)> {
+        let block = self.block_of[p as usize];
+        if block == NO_BLOCK {
+            return None;
+        }
+        let after = self.runs.partition_point(|run| run.block <= block as usize);
+        let run = after - 1;
+        Some((run, block as usize - self.runs[run].block))
+    }
+
+    /// Takes the block of particle `p` out of its run; the last one of the run fills the place.
+    fn remove_block(&mut self, p: u32) {
+        let Some((run, to)) = self.place_of(p) else {
+            return;
+        };
+        let run = &mut self.runs[run];
+        run.count -= 1;
+        let (from, z) = (run.count, run.size);
+        let moved = self.particle[run.block + from];
+        self.particle[run.block + to] = moved;
+        self.block_of[moved as usize] = (run.block + to) as u32;
+        let ends = run.end + z * from;
+        self.end.copy_within(ends..ends + z, run.end + z * to);
+        let values = run.value + pairs_of(z) * from;
+        let place = run.value + pairs_of(z) * to;
+        self.value.copy_within(values..values + pairs_of(z), place);
+        self.scaled.copy_within(values..values + pairs_of(z), place);
+    }
+
+    /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
+    pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
+        (self.changed, self.stale) = (true, true);
+        self.scaling[c] = if at_rest {
+            0.0
+        } else {
+            root_of_inverse(self.diagonal[c])
+        };
+    }
+
+    /// The order of the blocks: within each stretch of particles by size, then by particle.
+    fn sort_blocks(&mut self, duplicate: &DuplicateContactList) {
+        const SIZES: usize = LARGEST_SORTED + 2;
+        self.particle.clear();
+        self.runs.clear();
+        self.stretches.clear();
+        let size = |p: usize| duplicate.entries(p).len();
+        let particles = duplicate.particles();
+        for begin in (0..particles).step_by(STRETCH) {
+            let stretch = begin..particles.min(begin + STRETCH);
+            let mut next = [0; SIZES];
+            for p in stretch.clone() {
+                next[size(p).min(SIZES - 1)] += 1;
+            }
+            let mut end = self.particle.len();
+            for (z, count) in next.iter_mut().enumerate().skip(1) {
+                if *count > 0 && z <= LARGEST_SORTED {
+                    self.runs.push(Run::of(z, *count));
+                }
+                (*count, end) = (end, end + *count);
+            }
+            self.particle.resize(end, 0);
+            for p in stretch.clone().filter(|&p| size(p) > 0) {
+                let slot = &mut next[size(p).min(SIZES - 1)];
+                self.particle[*slot] = p as u32;
+                *slot += 1;
+            }
+            let behind = stretch.end as u32;
+            let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
+            self.runs.extend(large.map(|z| Run::of(z, 1)));
+            let contacts = self.pairs.partition_point(|pair| pair[0] < behind);
+            self.stretches.push([self.runs.len(), contacts]);
+        }
+        self.sorted = self.runs.len();
+    }
+
+    /// The matrix of those contacts alone that are not at rest: `order` has their numbers, and `contacts` them in this order.
+    pub(crate) fn of_some(
+        &self,
+        order: &[u32],
+        contacts: &ContactList,
+        duplicate: &DuplicateContactList,
+    ) -> Self {
+        let of_these = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
+        let mut some = Self {
+            diagonal: of_these(&self.diagonal),
+            scaling: of_these(&self.scaling),
+            pairs: contacts.pairs().collect(),
+            largest_root: self.largest_root,
+            ..Self::default()
+        };
+        some.lay_out(duplicate);
+        for block in 0..some.particle.len() {
+            let p = some.particle[block];
+            let (Some((from, place)), Some((to, at))) = (self.place_of(p), some.place_of(p)) else {
+                continue;
+            };
+            let (ends, values) = self.runs[from].block(place);
+            let numbers = duplicate.contacts(p as usize).iter();
+            let kept: Vec<usize> = numbers
+                .filter_map(|&k| {
+                    let c = order[k as usize];
+                    self.end[ends.clone()].iter().position(|e| e / 2 == c)
+                })
+                .collect();
+            let (_, own) = some.runs[to].block(at);
+            let couples = (1..kept.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+            for (value, (a, b)) in some.value[own].iter_mut().zip(couples) {
+                *value = self.value[values.start + pairs_of(kept[b]) + kept[a]];
+            }
+        }
+        some.stale = true;
+        some.rescale();
+        some
+    }
+}
+
+/// `A_cc^(−½)`.
+#[inline(always)]
+fn root_of_inverse(compliance: f64) -> f64 {
+    (1.0 / compliance).sqrt()
+}
+
+/// The ends of a particle's contacts, in the order of its partners.
+fn ends(duplicate: &DuplicateContactList, p: u32) -> impl Iterator<Item = u32> {
+    let partners = duplicate.partners(p as usize).iter();
+    let numbers = duplicate.contacts(p as usize).iter();
+    partners
+        .zip(numbers)
+        .map(move |(q, c)| 2 * c + u32::from(*q < p))
+}
