@@ -250,9 +250,9 @@ impl Observables {
             ..Self::default()
         };
         let sums = Sums::of(contacts);
-        o.energy = 0.5 * total(sums.work);
-        o.stress = sums.moments.map(|chains| 0.0 - total(chains));
-        o.contacts = total(sums.touching) as usize;
+        o.energy = 0.5 * sums.work;
+        o.stress = sums.moments.map(|moment| 0.0 - moment);
+        o.contacts = sums.touching;
         o.energy /= line_tension;
         for s in &mut o.stress {
             *s /= domain.area() * line_tension;
@@ -351,55 +351,57 @@ impl Observables {
 }
 
 /// Sums over contacts, each in eight chains: contact `c` belongs to chain `c mod 8`, and the chains are added in turn.
-#[derive(Default)]
 struct Sums {
     /// `Σ_c δ_c f_c` (force·length).
-    work: [f64; 8],
+    work: f64,
     /// `Σ_c f_c r_c n_α n_β` for xx, xy and yy (force·length).
-    moments: [[f64; 8]; 3],
+    moments: [f64; 3],
     /// Number of contacts with `f > 0`.
-    touching: [f64; 8],
+    touching: usize,
 }
+
+/// What of eight contacts at a time are added up.
+type Eight<'a> = (&'a [f64; 8], &'a [Vec2; 8], &'a [f64; 8], &'a [f64; 8]);
 
 impl Sums {
     fn of(contacts: &Contacts<'_>) -> Self {
         wide(
             #[inline(always)]
-            || Self::of_all(contacts),
+            || {
+                // One simple loop a quantity: several in one are not computed several contacts at a time.
+                let work = sum(contacts, |(f, _, _, o), k| o[k] * f[k]);
+                let xx = sum(contacts, |(f, n, r, _), k| f[k] * r[k] * n[k].x * n[k].x);
+                let xy = sum(contacts, |(f, n, r, _), k| f[k] * r[k] * n[k].x * n[k].y);
+                let yy = sum(contacts, |(f, n, r, _), k| f[k] * r[k] * n[k].y * n[k].y);
+                let touching = |f: f64| if f > 0.0 { 1.0 } else { 0.0 };
+                let touching = sum(contacts, |(f, _, _, _), k| touching(f[k]));
+                Self {
+                    work,
+                    moments: [xx, xy, yy],
+                    touching: touching as usize,
+                }
+            },
         )
-    }
-
-    #[inline(always)]
-    fn of_all(contacts: &Contacts<'_>) -> Self {
-        let mut sums = Self::default();
-        let (forces, last_forces) = contacts.forces.as_chunks::<8>();
-        let (normals, last_normals) = contacts.normals.as_chunks::<8>();
-        let (distances, last_distances) = contacts.distances.as_chunks::<8>();
-        let (overlaps, last_overlaps) = contacts.overlaps.as_chunks::<8>();
-        for (((f, n), r), o) in forces.iter().zip(normals).zip(distances).zip(overlaps) {
-            for k in 0..8 {
-                sums.add(k, (f[k], n[k], r[k], o[k]));
-            }
-        }
-        for (k, &f) in last_forces.iter().enumerate() {
-            sums.add(k, (f, last_normals[k], last_distances[k], last_overlaps[k]));
-        }
-        sums
-    }
-
-    /// Adds a contact, by force, normal, distance and overlap, to the chain `k`.
-    #[inline(always)]
-    fn add(&mut self, k: usize, (f, n, distance, overlap): (f64, Vec2, f64, f64)) {
-        let moment = f * distance;
-        self.work[k] += overlap * f;
-        self.moments[0][k] += moment * n.x * n.x;
-        self.moments[1][k] += moment * n.x * n.y;
-        self.moments[2][k] += moment * n.y * n.y;
-        self.touching[k] += if f > 0.0 { 1.0 } else { 0.0 };
     }
 }
 
-fn total(chains: [f64; 8]) -> f64 {
+/// Adds up what `of` gives for each contact.
+#[inline(always)]
+fn sum(contacts: &Contacts<'_>, of: impl Fn(Eight<'_>, usize) -> f64) -> f64 {
+    let (forces, last_forces) = contacts.forces.as_chunks::<8>();
+    let (normals, last_normals) = contacts.normals.as_chunks::<8>();
+    let (distances, last_distances) = contacts.distances.as_chunks::<8>();
+    let (overlaps, last_overlaps) = contacts.overlaps.as_chunks::<8>();
+    let mut chains = [0.0; 8];
+    for (((f, n), r), o) in forces.iter().zip(normals).zip(distances).zip(overlaps) {
+        for (k, chain) in chains.iter_mut().enumerate() {
+            *chain += of((f, n, r, o), k);
+        }
+    }
+    for (k, chain) in chains.iter_mut().enumerate().take(last_forces.len()) {
+        let one = [last_forces[k], last_distances[k], last_overlaps[k]].map(|x| [x; 8]);
+        *chain += of((&one[0], &[last_normals[k]; 8], &one[1], &one[2]), k);
+    }
     chains.into_iter().sum()
 }
 
