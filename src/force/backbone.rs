@@ -168,12 +168,11 @@ impl Backbone {
 /// Tells `each` of the pairs that `old` has alone (`false`) and `new` has alone (`true`), both in ascending order.
 fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2], bool)) {
     let (mut old, mut new) = (old, new);
-    loop {
+    while !(old.is_empty() && new.is_empty()) {
         let same = common(old, new);
         (old, new) = (&old[same..], &new[same..]);
         match (old.split_first(), new.split_first()) {
-            (None, None) => return,
-            (_, Some((came, rest))) if old.first().is_none_or(|gone| came < gone) => {
+            (gone, Some((came, rest))) if gone.is_none_or(|(gone, _)| came < gone) => {
                 each(*came, true);
                 new = rest;
             }
@@ -181,7 +180,7 @@ fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2]
                 each(*gone, false);
                 old = rest;
             }
-            (None, Some(_)) => return,
+            (None, _) => {}
         }
     }
 }
