@@ -171,6 +171,10 @@ pub(super) struct Outline {
 
 /// How far a contour is from a circle.
 #[derive(Clone, Copy)]
+#[cfg_attr(
+    not(feature = "recording"),
+    expect(dead_code, reason = "only recordings ask for it")
+)]
 pub(crate) struct Extent {
     /// The deepest dent at a contact, the largest `R_i − ρ_i` there (length).
     pub deepest: f64,

@@ -78,6 +78,7 @@ pub struct Backbone {
     rattlers: usize,
     /// Contacts that came since the frame before, one of whose particles is not held.
     open: Vec<[u32; 2]>,
+    room: Vec<[u32; 2]>,
     counts: u64,
 }
 
@@ -133,11 +134,17 @@ impl Backbone {
             for &(pair, came) in law.changes() {
                 stays &= self.change(pair, came);
             }
-            if self.is_closed() && stays {
-                self.pairs = None;
-            } else {
-                self.count_anew(particles, law.contacts().pairs);
+            if !(self.is_closed() && stays) {
+                let numbered = law.numbered();
+                let bearing = numbered.pairs.iter().zip(numbered.forces);
+                let bearing = bearing.filter(|(_, f)| **f > 0.0).map(|(pair, _)| *pair);
+                self.room.clear();
+                self.room.extend(bearing);
+                let pairs = core::mem::take(&mut self.room);
+                self.count_anew(particles, &pairs);
+                self.room = pairs;
             }
+            self.pairs = None;
         }
         self.set = all_touch.then_some(after);
         (self.rattlers, self.contacts)
@@ -164,6 +171,7 @@ impl Backbone {
             }
         }
         self.count_anew(particles, pairs);
+        self.pairs = Some(pairs.to_vec());
     }
 
     /// A contact has come, or is gone; says whether the particles that are held keep three contacts each.
@@ -197,6 +205,7 @@ impl Backbone {
         closed
     }
 
+    /// Counts the contacts `pairs`, in any order.
     fn count_anew(&mut self, particles: usize, pairs: &[[u32; 2]]) {
         self.all.clear();
         self.all.resize(particles, 0);
@@ -207,7 +216,6 @@ impl Backbone {
         self.rattlers = self.held.iter().filter(|n| **n < 3).count();
         self.counts += 1;
         self.open.clear();
-        self.pairs = Some(pairs.to_vec());
     }
 
     /// How often it was counted anew so far: a count of work.
@@ -222,7 +230,7 @@ impl Backbone {
 /// Tells `each` of the pairs that `old` has alone (`false`) and `new` has alone (`true`), both in ascending order.
 fn differences(old: &[[u32; 2]], new: &[[u32; 2]], mut each: impl FnMut([u32; 2], bool)) {
     let (mut old, mut new) = (old, new);
-    loop {
+    while !(old.is_empty() && new.is_empty()) {
         let same = common(old, new);
         (old, new) = (&old[same..], &new[same..]);
         match (old.split_first(), new.split_first()) {

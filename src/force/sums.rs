@@ -5,10 +5,11 @@
 //! the largest one is left out, which is what a plain sum can lose as well. (J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
 
 use crate::contact::Contacts;
+use crate::domain::Vec2;
 use crate::wide::wide;
 
 /// Chains that are summed side by side.
-const CHAINS: usize = 8;
+const CHAINS: usize = 4;
 
 /// What a frame's contacts sum up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,50 +32,104 @@ impl Sums {
 
     #[inline(always)]
     fn of_all(contacts: &Contacts<'_>) -> Self {
-        let (forces, distances) = (contacts.forces, contacts.distances);
-        let (normals, overlaps) = (contacts.normals, contacts.overlaps);
+        let (forces, f_rest) = contacts.forces.as_chunks();
+        let (normals, n_rest) = contacts.normals.as_chunks();
+        let (distances, r_rest) = contacts.distances.as_chunks();
+        let (overlaps, delta_rest) = contacts.overlaps.as_chunks();
+        // The last are filled up with contacts without a force.
+        let [mut f, mut r, mut delta] = [[0.0; CHAINS]; 3];
+        let mut n = [Vec2::zeros(); CHAINS];
+        f[..f_rest.len()].copy_from_slice(f_rest);
+        n[..n_rest.len()].copy_from_slice(n_rest);
+        r[..r_rest.len()].copy_from_slice(r_rest);
+        delta[..delta_rest.len()].copy_from_slice(delta_rest);
+
         // The number of terms, and bounds of them: `|n_α n_β| ≤ 1` but for rounding.
-        let (mut touching, mut bearing) = ([0.0; CHAINS], [0.0; CHAINS]);
-        let (mut most_moment, mut most_work) = ([0.0; CHAINS], [0.0; CHAINS]);
-        each(forces.len(), |k, c| {
-            let f: f64 = forces[c];
-            touching[k] += if f > 0.0 { 1.0 } else { 0.0 };
-            bearing[k] += if f == 0.0 { 0.0 } else { 1.0 };
-            most_moment[k] = larger(most_moment[k], (f * distances[c]).abs());
-            most_work[k] = larger(most_work[k], (f * overlaps[c]).abs());
-        });
-        let bearing = bearing.iter().sum::<f64>().max(2.0);
-        let of_moments = rounder(1.01 * bearing * most_moment.into_iter().fold(0.0, larger));
-        let of_work = rounder(bearing * most_work.into_iter().fold(0.0, larger));
-        let (mut work, mut moments) = ([0.0; CHAINS], [[0.0; CHAINS]; 3]);
-        each(forces.len(), |k, c| {
-            let (f, n) = (forces[c], normals[c]);
-            let moment = f * distances[c];
-            let rounded = |x: f64, rounder: f64| (x + rounder) - rounder;
-            work[k] += rounded(f * overlaps[c], of_work);
-            moments[0][k] += rounded(moment * n.x * n.x, of_moments);
-            moments[1][k] += rounded(moment * n.x * n.y, of_moments);
-            moments[2][k] += rounded(moment * n.y * n.y, of_moments);
-        });
+        let mut bounds = Bounds::default();
+        for (f, (r, delta)) in forces.iter().zip(distances.iter().zip(overlaps)) {
+            bounds.take(f, r, delta);
+        }
+        bounds.take(&f, &r, &delta);
+        let terms = bounds.bearing.iter().sum::<f64>().max(2.0);
+        let largest = |chains: [f64; CHAINS]| chains.into_iter().fold(0.0, larger);
+        let of_moments = rounder(1.01 * terms * largest(bounds.moment));
+        let of_work = rounder(terms * largest(bounds.work));
+
+        let mut work = [0.0; CHAINS];
+        for (f, delta) in forces.iter().zip(overlaps) {
+            add_work(&mut work, f, delta, of_work);
+        }
+        add_work(&mut work, &f, &delta, of_work);
+        let mut moments = [[0.0; CHAINS]; 3];
+        for (f, (r, n)) in forces.iter().zip(distances.iter().zip(normals)) {
+            add_moments(&mut moments, f, r, n, of_moments);
+        }
+        add_moments(&mut moments, &f, &r, &n, of_moments);
         Self {
             work: work.iter().sum(),
             moments: moments.map(|chains| chains.iter().sum()),
-            touching: touching.iter().sum::<f64>() as usize,
+            touching: bounds.touching.iter().sum::<f64>() as usize,
         }
     }
 }
 
-/// Calls `add` with the chain and the number of each of `count` contacts.
-#[inline(always)]
-fn each(count: usize, mut add: impl FnMut(usize, usize)) {
-    let whole = count - count % CHAINS;
-    for first in (0..whole).step_by(CHAINS) {
+/// Numbers and bounds of the terms, in chains.
+#[derive(Clone, Copy, Default)]
+struct Bounds {
+    touching: [f64; CHAINS],
+    bearing: [f64; CHAINS],
+    moment: [f64; CHAINS],
+    work: [f64; CHAINS],
+}
+
+impl Bounds {
+    #[inline(always)]
+    fn take(&mut self, f: &[f64; CHAINS], r: &[f64; CHAINS], delta: &[f64; CHAINS]) {
         for k in 0..CHAINS {
-            add(k, first + k);
+            self.touching[k] += if f[k] > 0.0 { 1.0 } else { 0.0 };
+        }
+        for k in 0..CHAINS {
+            self.bearing[k] += if f[k] == 0.0 { 0.0 } else { 1.0 };
+        }
+        for k in 0..CHAINS {
+            self.moment[k] = larger(self.moment[k], (f[k] * r[k]).abs());
+        }
+        for k in 0..CHAINS {
+            self.work[k] = larger(self.work[k], (f[k] * delta[k]).abs());
         }
     }
-    for c in whole..count {
-        add(0, c);
+}
+
+#[inline(always)]
+fn add_work(work: &mut [f64; CHAINS], f: &[f64; CHAINS], delta: &[f64; CHAINS], rounder: f64) {
+    for k in 0..CHAINS {
+        work[k] += (f[k] * delta[k] + rounder) - rounder;
+    }
+}
+
+#[inline(always)]
+fn add_moments(
+    [xx, xy, yy]: &mut [[f64; CHAINS]; 3],
+    f: &[f64; CHAINS],
+    r: &[f64; CHAINS],
+    n: &[Vec2; CHAINS],
+    rounder: f64,
+) {
+    let [mut x, mut y, mut moment] = [[0.0; CHAINS]; 3];
+    for k in 0..CHAINS {
+        (x[k], y[k]) = (n[k].x, n[k].y);
+    }
+    for k in 0..CHAINS {
+        moment[k] = f[k] * r[k];
+    }
+    for k in 0..CHAINS {
+        xx[k] += (moment[k] * x[k] * x[k] + rounder) - rounder;
+    }
+    for k in 0..CHAINS {
+        xy[k] += (moment[k] * x[k] * y[k] + rounder) - rounder;
+    }
+    for k in 0..CHAINS {
+        yy[k] += (moment[k] * y[k] * y[k] + rounder) - rounder;
     }
 }
 
@@ -95,7 +150,6 @@ fn rounder(bound: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::Vec2;
 
     /// A term of each kind from contacts with forces over many orders of magnitude.
     fn columns(count: usize) -> (Vec<f64>, Vec<Vec2>, Vec<f64>, Vec<f64>) {
