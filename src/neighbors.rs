@@ -57,6 +57,12 @@ impl NeighborList {
         &self.pairs
     }
 
+    /// Whether the list was built for the particles and the box of `packing`, wherever they were.
+    pub(crate) fn is_of(&self, packing: &Packing) -> bool {
+        let reference = self.reference.as_ref();
+        reference.is_some_and(|reference| reference.same_particles(packing))
+    }
+
     /// How often the list was built: a count of work, for benches and tests.
     ///
     /// ```

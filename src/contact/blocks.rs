@@ -9,7 +9,7 @@ use core::f64::consts::PI;
 use core::ops::Range;
 
 /// Blocks of `size` contacts, one after the other in each of the columns, and where they begin.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Run {
     pub(super) size: usize,
     pub(super) count: usize,
@@ -66,16 +66,16 @@ impl ContactMatrix {
         duplicate: &DuplicateContactList,
         line_tension: f64,
     ) {
-        let compliance = |sum: f64| -G_AT_CONTACT / (2.0 * PI * line_tension) * sum;
+        let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         self.diagonal.clear();
         self.pairs.clear();
         self.pairs.extend(contacts.pairs());
         for [i, j] in contacts.pairs() {
-            self.diagonal
-                .push(compliance(radii[i as usize] + radii[j as usize]));
+            let sum = radii[i as usize] + radii[j as usize];
+            self.diagonal.push(compliance(per_radius, sum));
         }
-        self.largest_root = compliance(2.0 * packing.largest_radius()).sqrt();
+        self.largest_root = compliance(per_radius, 2.0 * packing.largest_radius()).sqrt();
         self.scaling.resize(contacts.len(), 0.0);
         wide(
             #[inline(always)]
@@ -121,7 +121,7 @@ impl ContactMatrix {
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
-        let compliance = -G_AT_CONTACT * per_radius * sum;
+        let compliance = compliance(per_radius, sum);
         self.pairs.push(pair);
         self.diagonal.push(compliance);
         self.scaling.push(root_of_inverse(compliance));
@@ -180,6 +180,14 @@ impl ContactMatrix {
         let place = run.value + pairs_of(z) * to;
         self.value.copy_within(values..values + pairs_of(z), place);
         self.scaled.copy_within(values..values + pairs_of(z), place);
+    }
+
+    /// No contact is at rest any more and none was added: the contacts are those that the structure was built of.
+    pub(crate) fn make_whole(&mut self) {
+        if self.changed {
+            self.changed = false;
+            self.rescale();
+        }
     }
 
     /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
@@ -267,6 +275,12 @@ impl ContactMatrix {
         some.rescale();
         some
     }
+}
+
+/// `A_cc = (3/4πγ) (R_i + R_j)` from `1/2πγ` and the sum of radii: one formula, and so one rounding, for whoever needs it.
+#[inline(always)]
+pub(super) fn compliance(per_radius: f64, sum: f64) -> f64 {
+    -G_AT_CONTACT * per_radius * sum
 }
 
 /// `A_cc^(−½)`.

@@ -14,7 +14,7 @@ const SPARE: f64 = 0.05;
 const LONGEST: u32 = 50;
 
 /// How much wider than its sum a bound is taken, for the rounding of the sum.
-const WIDER: f64 = 1.0 + 1e-12;
+pub(super) const WIDER: f64 = 1.0 + 1e-12;
 
 /// Bounds of the bulges of all particles (length).
 #[derive(Clone, Debug, Default)]
@@ -104,19 +104,6 @@ impl Bulges {
         }
     }
 
-    /// Bounds with nothing to spare.
-    pub(super) fn sum(
-        &mut self,
-        pairs: &[[u32; 2]],
-        forces: &[f64],
-        radii: &[f64],
-        per_radius: f64,
-    ) {
-        self.spare = 0.0;
-        self.sum_with(pairs, forces, radii, per_radius);
-        self.forget();
-    }
-
     fn sum_with(&mut self, pairs: &[[u32; 2]], forces: &[f64], radii: &[f64], per_radius: f64) {
         self.counted.clear();
         self.counted.extend(forces.iter().map(|f| equivalent(*f)));
@@ -135,10 +122,19 @@ impl Bulges {
         }
     }
 
-    /// Cuts the bounds at `widest`; returns the first particle whose bound was wider, or no number, with that bound.
-    pub(super) fn cut(&mut self, widest: f64) -> Option<(usize, f64)> {
+    /// Narrows the bounds that are above `widest`, or no numbers, to what `exact` says of the particle, and that to `widest`;
+    /// returns the first particle of which it says more, with what it says. The next bounds are summed anew.
+    pub(super) fn cut(
+        &mut self,
+        widest: f64,
+        exact: impl Fn(usize) -> f64,
+    ) -> Option<(usize, f64)> {
         let mut first = None;
         for (particle, bound) in self.bound.iter_mut().enumerate() {
+            if *bound <= widest {
+                continue;
+            }
+            *bound = exact(particle);
             if bound.is_nan() || *bound > widest {
                 first.get_or_insert((particle, *bound));
                 *bound = widest;
@@ -167,7 +163,7 @@ mod tests {
         let radii: Vec<f64> = (0..40).map(|p| 0.5 + 0.01 * f64::from(p)).collect();
         let mut pairs: Vec<[u32; 2]> = (0..39).map(|p| [p, p + 1]).collect();
         let mut bulges = Bulges::default();
-        let (mut sums, mut numbers) = (0, 0);
+        let (mut sums, mut too_wide) = (0, 0);
         for step in 0..400 {
             if step % 30 == 10 && pairs.len() < 60 {
                 let p = pairs.len() as u32 - 39;
@@ -195,17 +191,21 @@ mod tests {
             for (p, exact) in exact.iter().enumerate() {
                 assert!(bulges.of(p) >= *exact);
                 assert!(bulges.of(p) <= bulges.largest());
-                numbers += usize::from(bulges.of(p) > 2.0 * exact + 0.1);
+                too_wide += usize::from(bulges.of(p) > 2.0 * exact + 0.1);
             }
         }
         assert!(sums < 10, "summed {sums} times");
         assert!(
-            numbers < 400 * 40 / 10,
-            "{numbers} bounds are much too wide"
+            too_wide < 400 * 40 / 10,
+            "{too_wide} bounds are much too wide"
         );
         bulges.bound(&pairs, &vec![f64::NAN; pairs.len()], &radii, 0.16);
         assert!(bulges.largest().is_nan());
-        assert_eq!(bulges.cut(1.0).map(|first| first.0), Some(0));
-        assert!(bulges.largest() <= 1.0);
+        assert_eq!(bulges.cut(1.0, |_| 0.5), None, "not as bad as that");
+        assert_eq!(bulges.largest(), 0.5);
+        bulges.bound(&pairs, &vec![f64::NAN; pairs.len()], &radii, 0.16);
+        let exact = |p| if p < 3 { 0.9 } else { 1.5 };
+        assert_eq!(bulges.cut(1.0, exact), Some((3, 1.5)));
+        assert_eq!(bulges.largest(), 1.0);
     }
 }

@@ -21,14 +21,14 @@
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
+use super::blocks::compliance;
 use super::error::ContactError;
-use super::images::second_image;
+use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
 use super::matrix::At;
 use super::present::in_order;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
-use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
 use crate::wide::wide;
 use core::f64::consts::PI;
@@ -72,7 +72,7 @@ impl ContactLaw {
             if mends > 0 && self.is_mendable() {
                 mends -= 1;
                 if self.mend(packing) {
-                    self.measure_scale();
+                    self.assemble(packing);
                     let (scale, worst) = (self.scale(), self.off.max(self.tolerated));
                     self.residual = if scale > 0.0 { worst / scale } else { worst };
                     return Ok(());
@@ -108,8 +108,8 @@ impl ContactLaw {
     /// Forces of the present set, and the pairs that offend, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
-        let refreshed = self.assemble(packing);
-        let iterations = self.find_forces(packing, refreshed)?;
+        let multiplied = self.assemble(packing);
+        let iterations = self.find_forces(packing, multiplied)?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
             Some(largest) => self.off = largest,
@@ -255,8 +255,13 @@ impl ContactLaw {
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         self.absurd = None;
         if self.bulges.largest().is_nan() || self.bulges.largest() > widest {
-            self.bulges.sum(pairs, forces, packing.radii(), per_radius);
-            self.absurd = self.bulges.cut(widest);
+            let loaded = Loaded {
+                packing,
+                geometry: &self.geometry,
+                forces,
+                per_radius,
+            };
+            self.absurd = self.bulges.cut(widest, |p| loaded.bulge(p));
         }
         self.cover(packing, self.bulges.largest());
     }
@@ -277,18 +282,18 @@ impl ContactLaw {
     /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
         let reach = |p: usize| packing.radii()[p] + self.bulges.of(p);
-        let scale = self.scale();
-        if let Some((particle, other)) = second_image(
+        let tolerance = ACCEPTED * self.allowed(self.scale());
+        let loaded = Loaded {
             packing,
-            &self.numbered(),
-            self.line_tension,
-            reach,
-            ACCEPTED * self.allowed(scale),
-        ) {
+            geometry: &self.geometry,
+            forces: &self.forces,
+            per_radius: 1.0 / (2.0 * PI * self.line_tension),
+        };
+        if let Some((particle, other)) = second_image(loaded, reach, tolerance) {
             return Err(ContactError::BoxTooSmall {
                 particle,
                 other,
-                reach: reach(particle),
+                reach: packing.radii()[particle] + loaded.bulge(particle),
                 shortest: packing.domain().shortest(),
             });
         }
@@ -352,9 +357,9 @@ impl ContactLaw {
                 .gap(packing, self.line_tension, &self.forces, i, j);
             worst = worst.max(-gap);
             if gap < -tolerance {
-                let compliance =
-                    -G_AT_CONTACT * (radii[i] + radii[j]) / (2.0 * PI * self.line_tension);
-                self.offending.push(Offence::Add(pair, -gap / compliance));
+                let per_radius = 1.0 / (2.0 * PI * self.line_tension);
+                let guess = -gap / compliance(per_radius, radii[i] + radii[j]);
+                self.offending.push(Offence::Add(pair, guess));
             } else {
                 self.tolerated = self.tolerated.max(-gap);
             }
@@ -403,6 +408,9 @@ impl ContactLaw {
             self.geometry.add(packing, pair);
             self.matrix
                 .add(packing, &self.geometry, pair, self.line_tension);
+        }
+        if self.is_in_order() {
+            self.matrix.make_whole();
         }
         // Both ascend.
         let mut came = came.iter().map(|c| c.0).peekable();

@@ -5,47 +5,83 @@
 //! means nothing. Images other than the nearest are at least half a side away, so that a bound of the bulges settles the
 //! question for nearly all particles; for the others the contours themselves are asked.
 
-use super::Contacts;
+use super::bulges::WIDER;
+use super::geometry::Geometry;
 use crate::domain::Vec2;
-use crate::droplet::kernel::Direction;
+use crate::droplet::kernel::{Direction, G_AT_CONTACT, G_MAX};
 use crate::packing::{Packing, unit_and_length};
-use core::f64::consts::PI;
 
-/// A particle and one whose second image its contour overlaps by more than `tolerance` (length), the first in order.
+/// Particles with the forces on them. All sums run in the order of a particle's partners.
+#[derive(Clone, Copy)]
+pub(super) struct Loaded<'a> {
+    pub(super) packing: &'a Packing,
+    pub(super) geometry: &'a Geometry,
+    pub(super) forces: &'a [f64],
+    /// `1/2πγ`.
+    pub(super) per_radius: f64,
+}
+
+impl Loaded<'_> {
+    /// A bound of the bulge of particle `p` (length); see [`bulges`](super::bulges).
+    pub(super) fn bulge(self, p: usize) -> f64 {
+        let on = self.geometry.duplicate().contacts(p).iter();
+        let bulges = on.map(|&c| {
+            let f = self.forces[c as usize];
+            if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f }
+        });
+        WIDER * bulges.sum::<f64>() * self.packing.radii()[p] * self.per_radius
+    }
+
+    /// `ρ_p` in a direction, Saitoh (1) and (3).
+    fn contour(self, p: usize, direction: Direction) -> f64 {
+        let around = self.geometry.around(p);
+        let terms =
+            around.map(|(_, c, toward)| self.forces[c as usize] * direction.g_between(toward));
+        self.packing.radii()[p] * (1.0 + terms.sum::<f64>() * self.per_radius)
+    }
+}
+
+/// A particle and one whose second image its contour overlaps by more than `tolerance` (length), the lower first; the first such
+/// pair in order.
 ///
-/// `reach` bounds the contour of each particle from outside (length), `line_tension` is γ. Costs O(N) for each particle
-/// whose reach exceeds a quarter of the shorter side, nothing else.
+/// `reach` bounds the contour of each particle from outside (length); a wider bound finds the same. Costs O(N) for each
+/// particle whose reach exceeds a quarter of the shorter side, nothing else.
 pub(super) fn second_image(
-    packing: &Packing,
-    contacts: &Contacts<'_>,
-    line_tension: f64,
+    particles: Loaded<'_>,
     reach: impl Fn(usize) -> f64,
     tolerance: f64,
 ) -> Option<(usize, usize)> {
+    let packing = particles.packing;
     let half = 0.5 * packing.domain().shortest();
     // Of two particles that reach half a side together, one reaches a quarter.
-    let far: Vec<usize> = (0..packing.len())
-        .filter(|&i| 2.0 * reach(i) > half)
-        .collect();
+    let far = (0..packing.len()).filter(|&i| 2.0 * reach(i) > half);
+    let mut first = None;
     for i in far {
         for j in 0..packing.len() {
-            let together = reach(i) + reach(j);
-            if together <= half {
+            let (together, pair) = (reach(i) + reach(j), (i.min(j), i.max(j)));
+            if together <= half || first.is_some_and(|first| first <= pair) {
                 continue;
             }
-            for separation in farther_images(packing, i, j, together) {
+            let touches = farther_images(packing, i, j, together).any(|separation| {
                 let (normal, distance) = unit_and_length(separation);
                 let to_j = Direction::of(-normal);
+                let [lower, higher] = [(i, to_j), (j, to_j.opposite())];
+                let [lower, higher] = if i <= j {
+                    [lower, higher]
+                } else {
+                    [higher, lower]
+                };
                 let gap = distance
-                    - contour(packing, contacts, line_tension, i, to_j)
-                    - contour(packing, contacts, line_tension, j, to_j.opposite());
-                if gap.is_nan() || gap < -tolerance {
-                    return Some((i, j));
-                }
+                    - particles.contour(lower.0, lower.1)
+                    - particles.contour(higher.0, higher.1);
+                gap.is_nan() || gap < -tolerance
+            });
+            if touches {
+                first = Some(pair);
             }
         }
     }
-    None
+    first
 }
 
 /// `r_i − r_j` to all images of `j` closer than `reach`, but for the nearest.
@@ -65,24 +101,4 @@ fn farther_images(
         .filter(|image| *image != (0, 0))
         .map(move |(x, y)| nearest + Vec2::new(f64::from(x) * l.x, f64::from(y) * l.y))
         .filter(move |separation| separation.norm_squared() < reach * reach)
-}
-
-/// `ρ_p` in a direction, Saitoh (1) and (3).
-fn contour(
-    packing: &Packing,
-    contacts: &Contacts<'_>,
-    line_tension: f64,
-    p: usize,
-    direction: Direction,
-) -> f64 {
-    let mut sum = 0.0;
-    for (c, &[i, j]) in contacts.pairs.iter().enumerate() {
-        let to_j = Direction::of(-contacts.normals[c]);
-        if i as usize == p {
-            sum += contacts.forces[c] * direction.g_between(to_j);
-        } else if j as usize == p {
-            sum += contacts.forces[c] * direction.g_between(to_j.opposite());
-        }
-    }
-    packing.radii()[p] * (1.0 + sum / (2.0 * PI * line_tension))
 }

@@ -69,7 +69,7 @@ pub struct ContactLaw {
     pub(super) forces: Vec<f64>,
     /// The numbers of the contacts that have left since the structure was built: they are at rest.
     pub(super) at_rest: Vec<u32>,
-    /// Contacts that came since the structure was built.
+    /// Contacts that came since the structure was built, in any order.
     pub(super) added: Vec<[u32; 2]>,
     /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
     /// and is called now.
@@ -215,7 +215,9 @@ impl ContactLaw {
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<(), ContactError> {
-        self.present();
+        if !self.is_in_order() {
+            self.present();
+        }
         let matrix = match self.present.get() {
             Some(present) if !self.is_in_order() => present.matrix(&self.matrix),
             _ => &self.matrix,
@@ -226,16 +228,16 @@ impl ContactLaw {
 
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.take(pairs, forces);
+        self.take(packing, pairs, forces);
         (self.refreshed, self.moved) = (false, f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
     }
 
-    fn take(&mut self, pairs: &[[u32; 2]], forces: &[f64]) {
+    fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.present.take();
-        if !self.is_in_order() || self.pairs != pairs {
+        if !self.is_in_order() || self.pairs != pairs || !self.neighbors.is_of(packing) {
             self.pairs.clear();
             self.pairs.extend_from_slice(pairs);
             self.at_rest.clear();
@@ -311,8 +313,8 @@ impl ContactLaw {
         forces: &[f64],
     ) -> Result<(), ContactError> {
         assert_eq!(pairs.len(), forces.len(), "one force a contact");
-        self.take(pairs, forces);
-        self.solve_again(packing)
+        self.take(packing, pairs, forces);
+        self.solve_within(packing, 0.0, f64::INFINITY)
     }
 
     /// [`solve`](Self::solve), starting from the contacts and forces found last.
@@ -333,6 +335,10 @@ impl ContactLaw {
     /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
     /// ```
     pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
+        if !self.neighbors.is_of(packing) {
+            // Other particles: contacts of the ones before mean nothing.
+            self.take(packing, &[], &[]);
+        }
         self.solve_within(packing, 0.0, f64::INFINITY)
     }
 

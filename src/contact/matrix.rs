@@ -45,7 +45,7 @@ use core::ops::Range;
 /// assert!((matrix.diagonal()[0] - 0.75 / PI).abs() < 1e-15);
 /// assert_eq!(matrix.row(0).collect::<Vec<_>>(), [(1, 0.125 / PI)]);
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct ContactMatrix {
     pub(super) diagonal: Vec<f64>,
     /// `A_cc^(−½)`, and 0 for a contact that is at rest.

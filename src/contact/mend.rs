@@ -13,6 +13,8 @@
 //! Contacts beyond the patch keep their forces, so that none of them begins to pull; the gap of a pair depends on the
 //! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
 
+use super::blocks::compliance;
+use super::bulges::WIDER;
 use super::complementarity::{Offence, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
@@ -156,7 +158,6 @@ impl ContactLaw {
 
     /// Lists the pairs that offend around the patches of a round; `false` if the forces are absurd.
     fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
-        let radii = packing.radii();
         let per_radius = 1.0 / (2.0 * PI * self.line_tension);
         let widest = WIDEST_BULGE * packing.largest_radius();
         self.offending.clear();
@@ -177,7 +178,7 @@ impl ContactLaw {
                     self.offending.push(Offence::Drop(contact, pair));
                 }
             }
-            bulge *= (1.0 + 1e-12) * radii[p as usize] * per_radius;
+            bulge *= WIDER * packing.radii()[p as usize] * per_radius;
             if bulge.is_nan() || bulge > widest {
                 return false;
             }
@@ -259,7 +260,7 @@ impl ContactLaw {
         });
         if gap < -tolerance {
             let sum = packing.radii()[i] + packing.radii()[j];
-            Some(gap / (G_AT_CONTACT * sum * per_radius))
+            Some(-gap / compliance(per_radius, sum))
         } else {
             self.tolerated = self.tolerated.max(-gap);
             None

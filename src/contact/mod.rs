@@ -26,6 +26,8 @@ pub mod complementarity;
 mod error;
 mod fill;
 mod geometry;
+#[cfg(test)]
+mod history;
 mod images;
 mod law;
 pub mod list;

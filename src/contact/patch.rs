@@ -1,7 +1,8 @@
 //! A patch of contacts on which the forces are corrected: see [`mend`](super::mend).
 
+use super::blocks::compliance;
 use super::geometry::Geometry;
-use crate::droplet::kernel::{Direction, G_AT_CONTACT};
+use crate::droplet::kernel::Direction;
 use crate::packing::Packing;
 
 /// Iterations that are tried.
@@ -29,13 +30,13 @@ impl Added {
     }
 }
 
-/// The patch, and the exchanges since the structure of the contact set was built. A contact's number is that of the
-/// structure; those added follow behind it.
+/// The patch, and the exchanges of the mend that it belongs to. A contact's number is that of the law; those that come in this mend
+/// follow behind.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Patch {
     /// Where each contact is in the patch, or one of the marks.
     pub(super) place: Vec<u32>,
-    /// The contacts of the structure that have left.
+    /// The contacts that have left.
     pub(super) gone: Vec<u32>,
     added: Vec<Added>,
     /// `(particle, partner, number in added)`, ascending.
@@ -260,7 +261,7 @@ impl Patch {
             self.contacts.push(contact as u32);
             let [i, j] = self.pair(whole, contact).map(|p| p as usize);
             let sum = whole.packing.radii()[i] + whole.packing.radii()[j];
-            let diagonal = -G_AT_CONTACT * whole.per_radius * sum;
+            let diagonal = compliance(whole.per_radius, sum);
             self.rows.push(Row {
                 diagonal,
                 inverse: 1.0 / diagonal,
