@@ -135,7 +135,6 @@ fn walks_of_packings_at_any_line_tension() {
             let start = Relaxation::new(&scene).unwrap();
             let steps = (60, size, f_max);
             let exchanges = walk(start.packing().clone(), (tension, 1e-12), steps, 3).unwrap();
-            println!("{particles} {phi} {size} {f_max}: {exchanges}");
             all += exchanges;
         }
     }
@@ -160,7 +159,6 @@ fn walks_of_a_hub_with_many_contacts() {
             let domain = Domain::new(40.0, 40.0).unwrap();
             let packing = Packing::new(domain, radii, points).unwrap();
             let exchanges = walk(packing, (0.3, tolerance), (60, size, f_max), 1).unwrap();
-            println!("{count} {size}: {exchanges}");
             all += exchanges;
         }
     }

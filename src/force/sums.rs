@@ -85,11 +85,11 @@ struct Bounds {
 impl Bounds {
     #[inline(always)]
     fn take(&mut self, f: &[f64; CHAINS], r: &[f64; CHAINS], delta: &[f64; CHAINS]) {
-        for k in 0..CHAINS {
-            self.touching[k] += if f[k] > 0.0 { 1.0 } else { 0.0 };
+        for (touching, f) in self.touching.iter_mut().zip(f) {
+            *touching += if *f > 0.0 { 1.0 } else { 0.0 };
         }
-        for k in 0..CHAINS {
-            self.bearing[k] += if f[k] == 0.0 { 0.0 } else { 1.0 };
+        for (bearing, f) in self.bearing.iter_mut().zip(f) {
+            *bearing += if *f == 0.0 { 0.0 } else { 1.0 };
         }
         for k in 0..CHAINS {
             self.moment[k] = larger(self.moment[k], (f[k] * r[k]).abs());

@@ -165,9 +165,9 @@ fn what_crosses_an_edge_is_drawn_at_its_other_side_and_nothing_else() {
             scene.line_tension,
         );
         let mut expected = Vec::new();
-        for p in 0..packing.len() {
+        for (p, recorded) in recorded[k].iter().enumerate() {
             // What is recorded is the contour in single precision, and images are those of what is recorded.
-            let polygon = recorded[k][p]
+            let polygon = recorded
                 .iter()
                 .map(|[x, y]| Vec2::new((*x).into(), (*y).into()));
             let mut polygon: Vec<Vec2> = polygon.collect();
