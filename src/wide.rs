@@ -12,37 +12,9 @@ pub(crate) fn wide<R>(loops: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(loops)
 }
 
-/// The largest of `|x|`, 0 of none; a NaN is passed over.
-#[inline]
-pub(crate) fn largest_magnitude(v: &[f64]) -> f64 {
-    let (v8, rest) = v.as_chunks::<8>();
-    let larger = |m: f64, x: f64| if x.abs() > m { x.abs() } else { m };
-    let mut most = [0.0; 8];
-    for x in v8 {
-        for k in 0..8 {
-            most[k] = larger(most[k], x[k]);
-        }
-    }
-    let most = most.into_iter().fold(0.0, larger);
-    rest.iter().copied().fold(most, larger)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn largest_magnitude_is_that_of_any_place() {
-        for n in 0..40 {
-            for place in 0..n {
-                let mut v: Vec<f64> = (0..n).map(|k| libm::sin(f64::from(k))).collect();
-                v[place as usize] = -2.0;
-                assert_eq!(largest_magnitude(&v), 2.0);
-                v[place as usize] = f64::NAN;
-                assert!(largest_magnitude(&v) <= 1.0);
-            }
-        }
-    }
 
     /// What the digests of recordings rely on: the copy for wide vectors rounds every product before it is added.
     #[test]

@@ -62,6 +62,7 @@ use crate::domain::{Domain, Vec2};
 use crate::packing::Packing;
 use crate::wide::wide;
 use sums::Sums;
+pub(crate) use sums::sum_of_forces;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
 ///

@@ -73,6 +73,36 @@ impl Sums {
     }
 }
 
+/// The number of contacts with a force, and the sum of their forces (force), in whatever order.
+pub(crate) fn sum_of_forces(contacts: &Contacts<'_>) -> (f64, f64) {
+    let (forces, rest) = contacts.forces.as_chunks();
+    let mut last = [0.0; CHAINS];
+    last[..rest.len()].copy_from_slice(rest);
+    wide(
+        #[inline(always)]
+        || {
+            let [mut bearing, mut most, mut sums] = [[0.0; CHAINS]; 3];
+            for f in forces.iter().chain([&last]) {
+                for (bearing, f) in bearing.iter_mut().zip(f) {
+                    *bearing += if *f == 0.0 { 0.0 } else { 1.0 };
+                }
+                for (most, f) in most.iter_mut().zip(f) {
+                    *most = larger(*most, f.abs());
+                }
+            }
+            let number: f64 = bearing.iter().sum();
+            let largest = most.into_iter().fold(0.0, larger);
+            let rounder = rounder(number.max(2.0) * largest);
+            for f in forces.iter().chain([&last]) {
+                for (sum, f) in sums.iter_mut().zip(f) {
+                    *sum += (f + rounder) - rounder;
+                }
+            }
+            (number, sums.iter().sum())
+        },
+    )
+}
+
 /// Numbers and bounds of the terms, in chains.
 #[derive(Clone, Copy, Default)]
 struct Bounds {
@@ -200,6 +230,21 @@ mod tests {
             let expected = sums(&ascending, false);
             assert_eq!(expected, sums(&shuffled, false));
             assert_eq!(expected, sums(&shuffled, true));
+
+            let none = Contacts {
+                pairs: &[],
+                normals: &[],
+                distances: &[],
+                overlaps: &[],
+                forces: &forces,
+            };
+            let backwards: Vec<f64> = forces.iter().rev().copied().chain([0.0]).collect();
+            let of_forces = sum_of_forces(&none);
+            let forces = &backwards[..];
+            assert_eq!(of_forces, sum_of_forces(&Contacts { forces, ..none }));
+            let plain: f64 = backwards.iter().sum();
+            assert!((of_forces.1 - plain).abs() <= 1e-12 * plain);
+            assert_eq!(of_forces.0, count as f64);
 
             // Against a plain sum from the smallest to the largest; six standard deviations of as many roundings.
             let mut terms: Vec<f64> = (0..count).map(|c| forces[c] * overlaps[c]).collect();
