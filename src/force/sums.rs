@@ -240,8 +240,11 @@ mod tests {
             };
             let backwards: Vec<f64> = forces.iter().rev().copied().chain([0.0]).collect();
             let of_forces = sum_of_forces(&none);
-            let forces = &backwards[..];
-            assert_eq!(of_forces, sum_of_forces(&Contacts { forces, ..none }));
+            let reversed = Contacts {
+                forces: &backwards,
+                ..none
+            };
+            assert_eq!(of_forces, sum_of_forces(&reversed));
             let plain: f64 = backwards.iter().sum();
             assert!((of_forces.1 - plain).abs() <= 1e-12 * plain);
             assert_eq!(of_forces.0, count as f64);
