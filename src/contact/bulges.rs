@@ -27,6 +27,11 @@ pub(super) struct Bulges {
     age: u32,
 }
 
+/// The most of a bulge that force `f` makes, in units of `R/2πγ` (force).
+pub(super) fn most_of(f: f64) -> f64 {
+    if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f }
+}
+
 /// The force (positive) that bulges as much as `f`.
 #[inline(always)]
 fn equivalent(f: f64) -> f64 {

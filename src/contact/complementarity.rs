@@ -26,12 +26,10 @@ use super::error::ContactError;
 use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
 use super::matrix::At;
-use super::present::in_order;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::packing::Packing;
 use crate::wide::wide;
-use core::f64::consts::PI;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
@@ -163,7 +161,7 @@ impl ContactLaw {
             let at = At {
                 packing,
                 forces: &self.forces,
-                per_radius: 1.0 / (2.0 * PI * self.line_tension),
+                per_radius: self.per_radius(),
             };
             self.matrix
                 .refresh(&mut self.geometry, at, &self.pairs, &mut self.products);
@@ -186,10 +184,12 @@ impl ContactLaw {
         if came.is_empty() && self.is_in_order() {
             return;
         }
-        let order = in_order(&self.pairs, &self.matrix);
-        let known = order.iter().map(|c| *c as usize);
-        let known = known.map(|c| (self.pairs[c], self.forces[c]));
+        let numbered = self.pairs.iter().zip(&self.forces);
+        let in_contact = numbered.zip(self.matrix.scaling());
+        let in_contact = in_contact.filter(|(_, scaling)| **scaling > 0.0);
+        let known = in_contact.map(|((pair, force), _)| (*pair, *force));
         let mut contacts: Vec<_> = known.chain(came.iter().copied()).collect();
+        // Most ascend already.
         contacts.sort_by_key(|c| c.0);
         (self.pairs, self.forces) = contacts.into_iter().unzip();
         self.at_rest.clear();
@@ -248,7 +248,7 @@ impl ContactLaw {
     /// `B_i`, and a neighbour list that covers the largest of them.
     fn bound_bulges(&mut self, packing: &Packing) {
         let widest = WIDEST_BULGE * packing.largest_radius();
-        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
+        let per_radius = self.per_radius();
         let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
         self.bulges
             .bound(pairs, forces, packing.radii(), per_radius);
@@ -287,7 +287,7 @@ impl ContactLaw {
             packing,
             geometry: &self.geometry,
             forces: &self.forces,
-            per_radius: 1.0 / (2.0 * PI * self.line_tension),
+            per_radius: self.per_radius(),
         };
         if let Some((particle, other)) = second_image(loaded, reach, tolerance) {
             return Err(ContactError::BoxTooSmall {
@@ -357,7 +357,7 @@ impl ContactLaw {
                 .gap(packing, self.line_tension, &self.forces, i, j);
             worst = worst.max(-gap);
             if gap < -tolerance {
-                let per_radius = 1.0 / (2.0 * PI * self.line_tension);
+                let per_radius = self.per_radius();
                 let guess = -gap / compliance(per_radius, radii[i] + radii[j]);
                 self.offending.push(Offence::Add(pair, guess));
             } else {

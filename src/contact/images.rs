@@ -5,10 +5,10 @@
 //! means nothing. Images other than the nearest are at least half a side away, so that a bound of the bulges settles the
 //! question for nearly all particles; for the others the contours themselves are asked.
 
-use super::bulges::WIDER;
+use super::bulges::{WIDER, most_of};
 use super::geometry::Geometry;
 use crate::domain::Vec2;
-use crate::droplet::kernel::{Direction, G_AT_CONTACT, G_MAX};
+use crate::droplet::kernel::Direction;
 use crate::packing::{Packing, unit_and_length};
 
 /// Particles with the forces on them. All sums run in the order of a particle's partners.
@@ -25,10 +25,7 @@ impl Loaded<'_> {
     /// A bound of the bulge of particle `p` (length); see [`bulges`](super::bulges).
     pub(super) fn bulge(self, p: usize) -> f64 {
         let on = self.geometry.duplicate().contacts(p).iter();
-        let bulges = on.map(|&c| {
-            let f = self.forces[c as usize];
-            if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f }
-        });
+        let bulges = on.map(|&c| most_of(self.forces[c as usize]));
         WIDER * bulges.sum::<f64>() * self.packing.radii()[p] * self.per_radius
     }
 

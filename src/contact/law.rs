@@ -11,6 +11,7 @@ use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::neighbors::NeighborList;
 use crate::packing::Packing;
+use core::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
@@ -200,6 +201,11 @@ impl ContactLaw {
         self.line_tension
     }
 
+    /// `1/2πγ`.
+    pub(super) fn per_radius(&self) -> f64 {
+        1.0 / (2.0 * PI * self.line_tension)
+    }
+
     /// Solves `A x = b` with the matrix found last, from the guess in `x`, to `max |A x − b| ≤ tolerance`.
     ///
     /// # Errors
@@ -215,14 +221,11 @@ impl ContactLaw {
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<(), ContactError> {
-        if !self.is_in_order() {
-            self.present();
-        }
-        let matrix = match self.present.get() {
-            Some(present) if !self.is_in_order() => present.matrix(&self.matrix),
-            _ => &self.matrix,
-        };
-        self.solver.solve(matrix, b, x, tolerance)?;
+        // `matrix` borrows the whole law.
+        let mut solver = core::mem::replace(&mut self.solver, LinearSolver::new(Method::default()));
+        let solved = solver.solve(self.matrix(), b, x, tolerance);
+        self.solver = solver;
+        solved?;
         Ok(())
     }
 

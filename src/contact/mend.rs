@@ -14,15 +14,14 @@
 //! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
 
 use super::blocks::compliance;
-use super::bulges::WIDER;
+use super::bulges::{WIDER, most_of};
 use super::complementarity::{Offence, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
 use super::patch::{GONE, NOWHERE, Patch, Whole};
 use super::tolerance::ACCEPTED;
-use crate::droplet::kernel::{Direction, G_AT_CONTACT, G_MAX};
+use crate::droplet::kernel::Direction;
 use crate::packing::{Packing, unit_and_length};
-use core::f64::consts::PI;
 
 /// Exchanges that are tried before the whole set is solved again.
 const ROUNDS: usize = 8;
@@ -71,6 +70,7 @@ impl ContactLaw {
     fn mend_in(&mut self, packing: &Packing, patch: &mut Patch) -> bool {
         let allowed = self.allowed(self.scale());
         let (before, tolerance) = (self.off, ACCEPTED * allowed);
+        let per_radius = self.per_radius();
         for _ in 0..ROUNDS {
             self.work.patches += 1;
             patch.begin_round();
@@ -82,9 +82,9 @@ impl ContactLaw {
                 };
                 patch.clear();
                 let most = self.contact_count() / 4;
-                let (whole, forces) = self.whole(packing);
+                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
                 patch.disturb(whole, contact, change);
-                let descent = patch.descend(whole, forces, 0.5 * allowed, most);
+                let descent = patch.descend(whole, &mut self.forces, 0.5 * allowed, most);
                 let Some((iterations, left)) = descent else {
                     return false;
                 };
@@ -103,16 +103,6 @@ impl ContactLaw {
             }
         }
         false
-    }
-
-    fn whole<'a>(&'a mut self, packing: &'a Packing) -> (Whole<'a>, &'a mut [f64]) {
-        let whole = Whole {
-            packing,
-            geometry: &self.geometry,
-            pairs: &self.pairs,
-            per_radius: 1.0 / (2.0 * PI * self.line_tension),
-        };
-        (whole, &mut self.forces)
     }
 
     /// Exchanges an offending pair, if it still offends by more than `tolerance` (length); returns its contact and by how much
@@ -138,7 +128,8 @@ impl ContactLaw {
             }
             Offence::Add(pair, _) => {
                 let guess = self.overlap_force(packing, patch, pair, tolerance)?;
-                let (whole, _) = self.whole(packing);
+                let per_radius = self.per_radius();
+                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
                 let contact = if let Some(contact) = patch.find(whole, pair) {
                     patch.gone.retain(|&c| c as usize != contact);
                     patch.place[contact] = NOWHERE;
@@ -158,21 +149,16 @@ impl ContactLaw {
 
     /// Lists the pairs that offend around the patches of a round; `false` if the forces are absurd.
     fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
-        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
+        let per_radius = self.per_radius();
         let widest = WIDEST_BULGE * packing.largest_radius();
         self.offending.clear();
         let mut largest: f64 = 0.0;
         for &p in &patch.visited {
             let mut bulge = 0.0;
-            let whole = Whole {
-                packing,
-                geometry: &self.geometry,
-                pairs: &self.pairs,
-                per_radius,
-            };
+            let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
             for (contact, _) in patch.contacts_of(whole, p) {
                 let f = self.forces[contact];
-                bulge += if f > 0.0 { G_MAX * f } else { G_AT_CONTACT * f };
+                bulge += most_of(f);
                 if f <= 0.0 && patch.place[contact] != GONE {
                     let pair = patch.pair(whole, contact);
                     self.offending.push(Offence::Drop(contact, pair));
@@ -245,13 +231,8 @@ impl ContactLaw {
         tolerance: f64,
     ) -> Option<f64> {
         let [i, j] = pair.map(|p| p as usize);
-        let per_radius = 1.0 / (2.0 * PI * self.line_tension);
-        let whole = Whole {
-            packing,
-            geometry: &self.geometry,
-            pairs: &self.pairs,
-            per_radius,
-        };
+        let per_radius = self.per_radius();
+        let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
         self.work.gaps += 1;
         let forces = &self.forces;
         let gap = gap_of(packing, self.line_tension, [i, j], |p| {

@@ -76,11 +76,28 @@ pub(super) struct Row {
 /// What a patch is cut from.
 #[derive(Clone, Copy)]
 pub(super) struct Whole<'a> {
-    pub(super) packing: &'a Packing,
-    pub(super) geometry: &'a Geometry,
-    pub(super) pairs: &'a [[u32; 2]],
+    packing: &'a Packing,
+    geometry: &'a Geometry,
+    pairs: &'a [[u32; 2]],
     /// `1/2πγ`.
-    pub(super) per_radius: f64,
+    per_radius: f64,
+}
+
+impl<'a> Whole<'a> {
+    /// `per_radius` is `1/2πγ`.
+    pub(super) fn of(
+        packing: &'a Packing,
+        geometry: &'a Geometry,
+        pairs: &'a [[u32; 2]],
+        per_radius: f64,
+    ) -> Self {
+        Self {
+            packing,
+            geometry,
+            pairs,
+            per_radius,
+        }
+    }
 }
 
 impl Patch {

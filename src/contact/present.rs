@@ -1,10 +1,10 @@
 //! The contacts as they are seen from outside: in the order of pairs, and no other among them. And what can be read off them in
 //! the order of their numbers, with the same bits.
 
-use super::Contacts;
 use super::law::ContactLaw;
 use super::list::{ContactList, DuplicateContactList};
 use super::matrix::ContactMatrix;
+use super::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::force::net_forces;
 use std::sync::OnceLock;
@@ -105,11 +105,7 @@ impl ContactLaw {
 pub(super) struct Present {
     /// Their numbers.
     order: Vec<u32>,
-    pairs: Vec<[u32; 2]>,
-    normals: Vec<Vec2>,
-    distances: Vec<f64>,
-    overlaps: Vec<f64>,
-    forces: Vec<f64>,
+    contacts: FrameContacts,
     particles: usize,
     matrix: OnceLock<ContactMatrix>,
 }
@@ -119,12 +115,15 @@ impl Present {
     pub(super) fn of(numbered: &Contacts<'_>, matrix: &ContactMatrix) -> Self {
         let order = in_order(numbered.pairs, matrix);
         let pick = |c: &u32| *c as usize;
-        Self {
+        let contacts = FrameContacts {
             pairs: order.iter().map(|c| numbered.pairs[pick(c)]).collect(),
             normals: order.iter().map(|c| numbered.normals[pick(c)]).collect(),
             distances: order.iter().map(|c| numbered.distances[pick(c)]).collect(),
             overlaps: order.iter().map(|c| numbered.overlaps[pick(c)]).collect(),
             forces: order.iter().map(|c| numbered.forces[pick(c)]).collect(),
+        };
+        Self {
+            contacts,
             particles: matrix.particles(),
             order,
             matrix: OnceLock::new(),
@@ -132,20 +131,14 @@ impl Present {
     }
 
     pub(super) fn contacts(&self) -> Contacts<'_> {
-        Contacts {
-            pairs: &self.pairs,
-            normals: &self.normals,
-            distances: &self.distances,
-            overlaps: &self.overlaps,
-            forces: &self.forces,
-        }
+        self.contacts.view()
     }
 
     /// The matrix of these contacts; `whole` is that of all numbers.
     pub(super) fn matrix(&self, whole: &ContactMatrix) -> &ContactMatrix {
         self.matrix.get_or_init(|| {
             let mut list = ContactList::default();
-            list.rebuild(self.particles, &self.pairs);
+            list.rebuild(self.particles, &self.contacts.pairs);
             let duplicate = DuplicateContactList::of(&list);
             whole.of_some(&self.order, &list, &duplicate)
         })
@@ -153,7 +146,7 @@ impl Present {
 }
 
 /// The numbers of the contacts that are not at rest, in the order of pairs.
-pub(super) fn in_order(pairs: &[[u32; 2]], matrix: &ContactMatrix) -> Vec<u32> {
+fn in_order(pairs: &[[u32; 2]], matrix: &ContactMatrix) -> Vec<u32> {
     let at_work = |c: &u32| matrix.scaling()[*c as usize] > 0.0;
     let (sorted, all) = (matrix.sorted_contacts() as u32, pairs.len() as u32);
     let mut late: Vec<u32> = (sorted..all).filter(at_work).collect();

@@ -199,7 +199,8 @@ impl Relaxation {
             return Ok(());
         }
         let domain = self.packing.domain();
-        self.fire.advance(
+        // Infinite after a step back: then each velocity is looked at.
+        let moved = self.fire.advance(
             &mut self.state,
             &self.net,
             &mut self.velocities,
@@ -212,8 +213,7 @@ impl Relaxation {
         // A NaN is thrown too.
         let within = |v: &Vec2| (v * dt).norm_squared() <= far * far;
         let thrown = |v: &Vec2| !within(v);
-        let farthest = largest_force(&self.velocities) * dt;
-        let near = farthest <= 0.99 * far;
+        let near = moved <= 0.99 * far;
         if !near && let Some(particle) = self.velocities.iter().position(thrown) {
             self.failed = true;
             return Err(RelaxError::TooFar {
@@ -224,12 +224,6 @@ impl Relaxation {
                 dt_max: self.state.dt_max,
             });
         }
-        // A step uphill goes back first.
-        let moved = if self.state.downhill > 0 {
-            farthest
-        } else {
-            f64::INFINITY
-        };
         if let Err(source) = self.solve(moved) {
             self.failed = true;
             let step = self.step;
