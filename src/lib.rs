@@ -78,4 +78,5 @@ pub mod relax;
 pub mod replay;
 pub mod scene;
 mod simplicial;
+pub mod threads;
 mod wide;

@@ -57,7 +57,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "FORM", value_parser = named::<softjam::force::Form>, help_heading = RELAXATION)]
     forces: Option<softjam::force::Form>,
 
-    /// Upper bound of the time step, in √(mass·length/γ) with mass 1 [default: 1/ω_max, from the largest frequency of the
+    /// Upper bound of the time step, in √(mass·length/γ) with mass 1 [default: 1.2/ω_max, from the largest frequency of the
     /// start].
     #[arg(long, value_name = "DT", value_parser = real, allow_negative_numbers = true, help_heading = RELAXATION)]
     dt_max: Option<f64>,
@@ -95,7 +95,7 @@ pub struct ChannelFlags {
 }
 
 const PACKING: &str = "Packing";
-const RELAXATION: &str = "Relaxation";
+pub const RELAXATION: &str = "Relaxation";
 pub const RECORDING: &str = "Recording";
 
 /// The place of the metrics among the channels.

@@ -1,7 +1,7 @@
 //! Where the blocks of a [`ContactMatrix`] are, and how contacts come and go without a new structure.
 
 use super::list::{ContactList, DuplicateContactList};
-use super::matrix::{ContactMatrix, Geometry};
+use super::matrix::{ContactMatrix, Geometry, Known};
 use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
 use crate::wide::wide;
@@ -77,6 +77,9 @@ impl ContactMatrix {
         }
         self.largest_root = compliance(per_radius, 2.0 * packing.largest_radius()).sqrt();
         self.scaling.resize(contacts.len(), 0.0);
+        self.scale.clear();
+        let scale = |r: &f64| -r * per_radius;
+        self.scale.extend(radii.iter().map(scale));
         wide(
             #[inline(always)]
             || {
@@ -90,14 +93,15 @@ impl ContactMatrix {
 
     /// Places for the blocks.
     fn lay_out(&mut self, duplicate: &DuplicateContactList) {
-        self.changed = false;
+        (self.changed, self.known) = (false, Known::Nothing);
         self.sort_blocks(duplicate);
         self.block_of.clear();
         self.block_of.resize(duplicate.particles(), NO_BLOCK);
         self.end.clear();
         for (block, &p) in self.particle.iter().enumerate() {
             self.block_of[p as usize] = block as u32;
-            self.end.extend(ends(duplicate, p));
+            let row = duplicate.entries(p as usize);
+            self.end.extend(duplicate.ends(p, row));
         }
         let (mut block, mut end, mut value) = (0, 0, 0);
         for run in &mut self.runs {
@@ -136,20 +140,14 @@ impl ContactMatrix {
             };
             self.block_of[p as usize] = run.block as u32;
             self.particle.push(p);
-            self.end.extend(ends(geometry.duplicate(), p));
+            let duplicate = geometry.duplicate();
+            let row = duplicate.entries(p as usize);
+            self.end.extend(duplicate.ends(p, row));
             self.value.resize(run.values().end, 0.0);
             self.scaled.resize(run.values().end, 0.0);
             self.runs.push(run);
-            // The scaled values follow.
-            let ends = &self.end[run.ends()];
-            let scale = -radii[p as usize] * per_radius;
-            let couples = (1..ends.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-            for (value, (a, b)) in self.value[run.values()].iter_mut().zip(couples) {
-                let toward = geometry.toward(ends[a]);
-                *value = scale * toward.g_between(geometry.toward(ends[b]));
-            }
         }
-        self.stale = true;
+        self.known = Known::Nothing;
     }
 
     /// The run that the block of particle `p` is in, and its place there.
@@ -176,23 +174,16 @@ impl ContactMatrix {
         self.block_of[moved as usize] = (run.block + to) as u32;
         let ends = run.end + z * from;
         self.end.copy_within(ends..ends + z, run.end + z * to);
-        let values = run.value + pairs_of(z) * from;
-        let place = run.value + pairs_of(z) * to;
-        self.value.copy_within(values..values + pairs_of(z), place);
-        self.scaled.copy_within(values..values + pairs_of(z), place);
     }
 
     /// No contact is at rest any more and none was added: the contacts are those that the structure was built of.
     pub(crate) fn make_whole(&mut self) {
-        if self.changed {
-            self.changed = false;
-            self.rescale();
-        }
+        self.changed = false;
     }
 
     /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
     pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
-        (self.changed, self.stale) = (true, true);
+        (self.changed, self.known) = (true, Known::Nothing);
         self.scaling[c] = if at_rest {
             0.0
         } else {
@@ -236,43 +227,25 @@ impl ContactMatrix {
         self.sorted = self.runs.len();
     }
 
-    /// The matrix of those contacts alone that are not at rest: `order` has their numbers, and `contacts` them in this order.
+    /// The matrix of those contacts alone that are not at rest: `order` has their numbers, `contacts` them in this order, and
+    /// `geometry` where they are.
     pub(crate) fn of_some(
         &self,
         order: &[u32],
         contacts: &ContactList,
-        duplicate: &DuplicateContactList,
+        geometry: &Geometry,
     ) -> Self {
         let of_these = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
         let mut some = Self {
             diagonal: of_these(&self.diagonal),
             scaling: of_these(&self.scaling),
+            scale: self.scale.clone(),
             pairs: contacts.pairs().collect(),
             largest_root: self.largest_root,
             ..Self::default()
         };
-        some.lay_out(duplicate);
-        for block in 0..some.particle.len() {
-            let p = some.particle[block];
-            let (Some((from, place)), Some((to, at))) = (self.place_of(p), some.place_of(p)) else {
-                continue;
-            };
-            let (ends, values) = self.runs[from].block(place);
-            let numbers = duplicate.contacts(p as usize).iter();
-            let kept: Vec<usize> = numbers
-                .filter_map(|&k| {
-                    let c = order[k as usize];
-                    self.end[ends.clone()].iter().position(|e| e / 2 == c)
-                })
-                .collect();
-            let (_, own) = some.runs[to].block(at);
-            let couples = (1..kept.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-            for (value, (a, b)) in some.value[own].iter_mut().zip(couples) {
-                *value = self.value[values.start + pairs_of(kept[b]) + kept[a]];
-            }
-        }
-        some.stale = true;
-        some.rescale();
+        some.lay_out(geometry.duplicate());
+        some.complete(geometry);
         some
     }
 }
@@ -287,13 +260,4 @@ pub(super) fn compliance(per_radius: f64, sum: f64) -> f64 {
 #[inline(always)]
 fn root_of_inverse(compliance: f64) -> f64 {
     (1.0 / compliance).sqrt()
-}
-
-/// The ends of a particle's contacts, in the order of its partners.
-fn ends(duplicate: &DuplicateContactList, p: u32) -> impl Iterator<Item = u32> {
-    let partners = duplicate.partners(p as usize).iter();
-    let numbers = duplicate.contacts(p as usize).iter();
-    partners
-        .zip(numbers)
-        .map(move |(q, c)| 2 * c + u32::from(*q < p))
 }

@@ -21,15 +21,14 @@
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
-use super::blocks::compliance;
 use super::error::ContactError;
 use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
-use super::matrix::At;
+use super::search::Scene;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::packing::Packing;
-use crate::wide::wide;
+use crate::threads::both;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
@@ -121,20 +120,34 @@ impl ContactLaw {
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
-        self.matrix.rescale();
-        let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
-        let forces = &mut self.forces[..];
+        if !multiplied {
+            self.matrix.complete(&self.geometry);
+        }
+        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
+        self.matrix.keeps_values = !loosely;
         let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            return self.solver.solve(matrix, overlaps, forces, tolerance);
+            self.matrix.keeps_values = true;
+            self.matrix.complete(&self.geometry);
+            let overlaps = self.geometry.overlaps();
+            let solver = &mut self.solver;
+            return solver.solve(&self.matrix, overlaps, &mut self.forces, tolerance);
         };
-        let goal = (tolerance, tolerance > FAR_ABOVE_ROUND_OFF * scale);
-        let products = multiplied.then_some(&self.products[..]);
-        let iterations = match solver.begin(matrix, overlaps, forces, goal, products)? {
+        let (overlaps, forces) = (self.geometry.overlaps(), &mut self.forces[..]);
+        let goal = (tolerance, loosely);
+        let products = multiplied.then_some(self.products.sums());
+        let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, products)?;
+        if let Progress::NeedsValues(iterations) = progress {
+            self.matrix.complete(&self.geometry);
+            let from = (None, iterations);
+            progress = solver.go_on(&self.matrix, overlaps, forces, goal, from)?;
+        }
+        let iterations = match progress {
             Progress::Done(iterations) => return Ok(iterations),
-            Progress::NeedsWhole(iterations) => iterations,
+            Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => iterations,
         };
         self.put_in_order(&[]);
         self.assemble(packing);
+        self.matrix.complete(&self.geometry);
         let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
             return Ok(iterations);
         };
@@ -158,17 +171,15 @@ impl ContactLaw {
         }
         let anew = !(self.structured && self.refreshed);
         if anew {
-            let at = At {
-                packing,
-                forces: &self.forces,
-                per_radius: self.per_radius(),
-            };
-            self.matrix
-                .refresh(&mut self.geometry, at, &self.pairs, &mut self.products);
+            let (geometry, products) = (&mut self.geometry, &mut self.products);
+            let at = (packing, &self.pairs[..], &self.forces[..]);
+            self.scale = self.matrix.refresh(geometry, at, products);
             self.work.assemblies += 1;
             (self.structured, self.refreshed) = (true, true);
+        } else {
+            let all = 0..self.matrix.len();
+            self.scale = self.matrix.largest_overlap(&self.geometry, all);
         }
-        self.measure_scale();
         anew
     }
 
@@ -203,29 +214,10 @@ impl ContactLaw {
         self.scale
     }
 
-    pub(super) fn measure_scale(&mut self) {
-        let larger = |m: f64, x: f64| if x > m { x } else { m };
-        let in_contact = |d: f64, s: f64| if s > 0.0 { d.abs() } else { 0.0 };
-        let (d8, d_rest) = self.geometry.overlaps().as_chunks::<8>();
-        let (s8, s_rest) = self.matrix.scaling().as_chunks::<8>();
-        let mut largest = [0.0; 8];
-        wide(
-            #[inline(always)]
-            || {
-                for (d, s) in d8.iter().zip(s8) {
-                    for k in 0..8 {
-                        largest[k] = larger(largest[k], in_contact(d[k], s[k]));
-                    }
-                }
-            },
-        );
-        let rest = d_rest.iter().zip(s_rest).map(|(d, s)| in_contact(*d, *s));
-        self.scale = rest.chain(largest).fold(0.0, larger);
-    }
-
     /// `max |A f − δ|` of the present forces.
     pub(super) fn measure_equation(&mut self) {
         self.image.resize(self.forces.len(), 0.0);
+        self.matrix.complete(&self.geometry);
         self.matrix.multiply(&self.forces, &mut self.image);
         self.off = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
@@ -341,28 +333,31 @@ impl ContactLaw {
             }
         }
         self.work.distances += (self.others.len() + self.at_rest.len()) as u64;
-        let (radii, positions) = (packing.radii(), packing.positions());
-        let domain = packing.domain();
+        let at = Scene {
+            packing,
+            line_tension: self.line_tension,
+            geometry: &self.geometry,
+            forces: &self.forces,
+            bulges: &self.bulges,
+            tolerance,
+        };
         let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
-        for pair in self.others.iter().copied().chain(at_rest) {
-            let [i, j] = [pair[0] as usize, pair[1] as usize];
-            let separation = domain.minimum_image(positions[i] - positions[j]);
-            let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
-            if separation.norm_squared() >= reach * reach {
-                continue;
-            }
-            self.work.gaps += 1;
-            let gap = self
-                .geometry
-                .gap(packing, self.line_tension, &self.forces, i, j);
-            worst = worst.max(-gap);
-            if gap < -tolerance {
-                let per_radius = self.per_radius();
-                let guess = -gap / compliance(per_radius, radii[i] + radii[j]);
-                self.offending.push(Offence::Add(pair, guess));
-            } else {
-                self.tolerated = self.tolerated.max(-gap);
-            }
+        let half = if self.matrix.is_for_two() {
+            self.others.len() / 2
+        } else {
+            self.others.len()
+        };
+        let (some, more) = self.others.split_at(half);
+        let [one, other] = &mut self.searches;
+        both(
+            || one.look_at(at, some.iter().copied()),
+            || other.look_at(at, more.iter().copied().chain(at_rest)),
+        );
+        for search in &self.searches {
+            self.work.gaps += search.near.len() as u64;
+            self.offending.extend_from_slice(&search.found);
+            worst = worst.max(search.worst);
+            self.tolerated = self.tolerated.max(search.tolerated);
         }
         self.offending
             .sort_unstable_by_key(|offence| offence.pair());

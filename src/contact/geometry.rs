@@ -31,10 +31,52 @@ pub struct Geometry {
     /// The angles of the directions from the lower particle to the higher, those of `−n_ij`.
     angles: Vec<f64>,
     duplicate: DuplicateContactList,
-    /// Room for the components of the normals and the making of the angles.
+    /// Room for the components of the normals and the making of the angles, in each of two threads.
+    rooms: [Room; 2],
+}
+
+/// The directions of some contacts, the first ones by number.
+#[derive(Clone, Copy)]
+pub(crate) struct Directions<'a> {
+    normals: &'a [Vec2],
+    angles: &'a [f64],
+}
+
+impl Directions<'_> {
+    /// The direction in which an end of a contact points: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
+    #[inline(always)]
+    pub(crate) fn toward(self, end: u32) -> Direction {
+        let c = (end >> 1) as usize;
+        let normal = self.normals[c];
+        let from_lower = Direction {
+            cos: -normal.x,
+            sin: -normal.y,
+            angle: self.angles[c],
+        };
+        let from_higher = from_lower.opposite();
+        if end & 1 == 0 {
+            from_lower
+        } else {
+            from_higher
+        }
+    }
+}
+
+/// Room for some contacts.
+#[derive(Clone, Debug, Default)]
+struct Room {
     x: Vec<f64>,
     y: Vec<f64>,
     nodes: Vec<[f64; 2]>,
+}
+
+/// The columns of some contacts.
+pub(crate) struct Part<'a> {
+    normals: &'a mut [Vec2],
+    distances: &'a mut [f64],
+    overlaps: &'a mut [f64],
+    angles: &'a mut [f64],
+    room: &'a mut Room,
 }
 
 impl Geometry {
@@ -62,7 +104,7 @@ impl Geometry {
         let pairs: Vec<_> = contacts.pairs().collect();
         wide(
             #[inline(always)]
-            || self.refresh(packing, &pairs, 0..pairs.len()),
+            || self.part(0..pairs.len()).refresh(packing, &pairs),
         );
     }
 
@@ -87,62 +129,48 @@ impl Geometry {
         self.angles.push(Direction::of(-normal).angle);
     }
 
-    /// Computes some of the contacts anew for the positions of `packing`; `pairs` are all of them.
-    ///
-    /// To be inlined into loops that are compiled for wide vectors.
+    /// The columns of some contacts, to be computed anew.
     #[inline(always)]
-    pub(crate) fn refresh(
-        &mut self,
-        packing: &Packing,
-        pairs: &[[u32; 2]],
-        contacts: Range<usize>,
-    ) {
-        let (positions, radii) = (packing.positions(), packing.radii());
-        let sides = packing.domain().lengths();
-        let angles = Angles::new();
-        for column in [&mut self.x, &mut self.y] {
-            column.resize(TOGETHER, 0.0);
+    pub(crate) fn part(&mut self, contacts: Range<usize>) -> Part<'_> {
+        Part {
+            normals: &mut self.normals[contacts.clone()],
+            distances: &mut self.distances[contacts.clone()],
+            overlaps: &mut self.overlaps[contacts.clone()],
+            angles: &mut self.angles[contacts],
+            room: &mut self.rooms[0],
         }
-        // Some contacts at a time, so that what is computed of them stays in the fastest memory.
-        let columns = self.distances[contacts.clone()].chunks_mut(TOGETHER);
-        let columns = columns.zip(self.overlaps[contacts.clone()].chunks_mut(TOGETHER));
-        let columns = columns.zip(self.normals[contacts.clone()].chunks_mut(TOGETHER));
-        let groups = self.angles[contacts.clone()].chunks_mut(TOGETHER);
-        let groups = groups.zip(pairs[contacts].chunks(TOGETHER));
-        for (((distances, overlaps), normals), (own, pairs)) in columns.zip(groups) {
-            let count = pairs.len();
-            let (x, y) = (&mut self.x[..count], &mut self.y[..count]);
-            let rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
-            for (&[i, j], ((x, y), overlap)) in pairs.iter().zip(rows) {
-                let (i, j) = (i as usize, j as usize);
-                let difference = positions[i] - positions[j];
-                (*x, *y) = (difference.x, difference.y);
-                *overlap = radii[i] + radii[j];
-            }
-            // One simple loop a quantity, so that each is done several contacts at a time.
-            for x in &mut *x {
-                *x = nearest(*x, sides.x);
-            }
-            for y in &mut *y {
-                *y = nearest(*y, sides.y);
-            }
-            for ((r, x), y) in distances.iter_mut().zip(&*x).zip(&*y) {
-                *r = (x * x + y * y).sqrt();
-            }
-            for ((x, y), r) in x.iter_mut().zip(&mut *y).zip(&*distances) {
-                let inverse = 1.0 / r;
-                // Coincident centres are told apart along x, as in `unit_and_length`.
-                *x = if *r > 0.0 { *x * inverse } else { 1.0 };
-                *y = if *r > 0.0 { *y * inverse } else { 0.0 };
-            }
-            for (overlap, r) in overlaps.iter_mut().zip(&*distances) {
-                *overlap -= r;
-            }
-            for (normal, (x, y)) in normals.iter_mut().zip(x.iter_mut().zip(&mut *y)) {
-                *normal = Vec2::new(*x, *y);
-                (*x, *y) = (-*x, -*y);
-            }
-            angles.of_columns((x, y), &mut self.nodes, own);
+    }
+
+    /// Those of all contacts, in two parts: the first `middle` contacts and the others.
+    pub(crate) fn halves(&mut self, middle: usize) -> [Part<'_>; 2] {
+        let (normals, more_normals) = self.normals.split_at_mut(middle);
+        let (distances, more_distances) = self.distances.split_at_mut(middle);
+        let (overlaps, more_overlaps) = self.overlaps.split_at_mut(middle);
+        let (angles, more_angles) = self.angles.split_at_mut(middle);
+        let [room, more_room] = &mut self.rooms;
+        let one = Part {
+            normals,
+            distances,
+            overlaps,
+            angles,
+            room,
+        };
+        let other = Part {
+            normals: more_normals,
+            distances: more_distances,
+            overlaps: more_overlaps,
+            angles: more_angles,
+            room: more_room,
+        };
+        [one, other]
+    }
+
+    /// The directions of all contacts.
+    #[inline(always)]
+    pub(crate) fn directions(&self) -> Directions<'_> {
+        Directions {
+            normals: &self.normals,
+            angles: &self.angles,
         }
     }
 
@@ -194,21 +222,22 @@ impl Geometry {
         &self.duplicate
     }
 
-    /// The direction in which an end of a contact points: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
+    /// [`Directions::toward`].
     #[inline(always)]
     pub(crate) fn toward(&self, end: u32) -> Direction {
-        let c = (end >> 1) as usize;
-        let normal = self.normals[c];
-        let from_lower = Direction {
-            cos: -normal.x,
-            sin: -normal.y,
-            angle: self.angles[c],
-        };
-        let from_higher = from_lower.opposite();
-        if end & 1 == 0 {
-            from_lower
-        } else {
-            from_higher
+        self.directions().toward(end)
+    }
+
+    /// That of some of the contacts, `contacts`: `order` has their numbers.
+    pub(crate) fn of_some(&self, order: &[u32], contacts: &ContactList) -> Self {
+        let pick = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
+        Self {
+            normals: order.iter().map(|c| self.normals[*c as usize]).collect(),
+            distances: pick(&self.distances),
+            overlaps: pick(&self.overlaps),
+            angles: pick(&self.angles),
+            duplicate: DuplicateContactList::of(contacts),
+            ..Self::default()
         }
     }
 
@@ -223,6 +252,7 @@ impl Geometry {
     /// `r_ij − ρ_i(θ_j) − ρ_j(θ_i)`, which is `−Δ_ij` in Saitoh 2.2.4.
     ///
     /// `forces` has one entry a contact, `line_tension` is γ.
+    #[cfg(feature = "recording")]
     pub(crate) fn gap(
         &self,
         packing: &Packing,
@@ -235,6 +265,62 @@ impl Geometry {
             self.around(p)
                 .map(|(_, c, toward)| (forces[c as usize], toward))
         })
+    }
+}
+
+impl Part<'_> {
+    /// Computes the contacts `pairs` at the positions of `packing`.
+    ///
+    /// To be inlined into loops that are compiled for wide vectors.
+    #[inline(always)]
+    pub(crate) fn refresh(self, packing: &Packing, pairs: &[[u32; 2]]) {
+        let (positions, radii) = (packing.positions(), packing.radii());
+        let sides = packing.domain().lengths();
+        let angles = Angles::new();
+        for column in [&mut self.room.x, &mut self.room.y] {
+            column.resize(TOGETHER, 0.0);
+        }
+        // Some contacts at a time, so that what is computed of them stays in the fastest memory.
+        let columns = self.distances.chunks_mut(TOGETHER);
+        let columns = columns.zip(self.overlaps.chunks_mut(TOGETHER));
+        let columns = columns.zip(self.normals.chunks_mut(TOGETHER));
+        let groups = self.angles.chunks_mut(TOGETHER);
+        let groups = groups.zip(pairs.chunks(TOGETHER));
+        for (((distances, overlaps), normals), (own, pairs)) in columns.zip(groups) {
+            let count = pairs.len();
+            let (x, y) = (&mut self.room.x[..count], &mut self.room.y[..count]);
+            let rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
+            for (&[i, j], ((x, y), overlap)) in pairs.iter().zip(rows) {
+                let (i, j) = (i as usize, j as usize);
+                let difference = positions[i] - positions[j];
+                (*x, *y) = (difference.x, difference.y);
+                *overlap = radii[i] + radii[j];
+            }
+            // One simple loop a quantity, so that each is done several contacts at a time.
+            for x in &mut *x {
+                *x = nearest(*x, sides.x);
+            }
+            for y in &mut *y {
+                *y = nearest(*y, sides.y);
+            }
+            for ((r, x), y) in distances.iter_mut().zip(&*x).zip(&*y) {
+                *r = (x * x + y * y).sqrt();
+            }
+            for ((x, y), r) in x.iter_mut().zip(&mut *y).zip(&*distances) {
+                let inverse = 1.0 / r;
+                // Coincident centres are told apart along x, as in `unit_and_length`.
+                *x = if *r > 0.0 { *x * inverse } else { 1.0 };
+                *y = if *r > 0.0 { *y * inverse } else { 0.0 };
+            }
+            for (overlap, r) in overlaps.iter_mut().zip(&*distances) {
+                *overlap -= r;
+            }
+            for (normal, (x, y)) in normals.iter_mut().zip(x.iter_mut().zip(&mut *y)) {
+                *normal = Vec2::new(*x, *y);
+                (*x, *y) = (-*x, -*y);
+            }
+            angles.of_columns((x, y), &mut self.room.nodes, own);
+        }
     }
 }
 
@@ -279,7 +365,7 @@ mod tests {
             let mut pairs = base;
             pairs.push(late);
             let mut refreshed = geometry.clone();
-            refreshed.refresh(&packing, &pairs, 0..pairs.len());
+            refreshed.part(0..5).refresh(&packing, &pairs);
             for geometry in [geometry, refreshed] {
                 for p in 0..5 {
                     let bits = |(q, _, d): (u32, u32, Direction)| {

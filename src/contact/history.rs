@@ -3,6 +3,7 @@
 use super::law::{ContactLaw, Rule};
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
+use super::product::Products;
 use super::solver::{ConjugateGradient, Method};
 use crate::domain::{Domain, Vec2};
 use crate::force::{Backbone, Observables, net_forces};
@@ -38,9 +39,9 @@ fn image(matrix: &ContactMatrix) -> Vec<f32> {
     let x: Vec<f32> = (0..matrix.len())
         .map(|k| (k * 37 % 101) as f32 - 50.0)
         .collect();
-    let mut y = vec![0.0; x.len()];
-    matrix.products(matrix.scaled(), &x, &mut y);
-    y
+    let mut y = Products::default();
+    matrix.products_into(matrix.scaled(), &x, &mut y);
+    y.sums().to_vec()
 }
 
 /// Everything that can be asked of two laws, and of the matrix made anew.

@@ -7,6 +7,8 @@ use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
 use super::patch::Patch;
 use super::present::{Present, name_of};
+use super::product::Products;
+use super::search::Search;
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::neighbors::NeighborList;
@@ -87,12 +89,14 @@ pub struct ContactLaw {
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
-    pub(super) products: Vec<f64>,
+    pub(super) products: Products<f64>,
     pub(super) bulges: Bulges,
     /// The largest bulge that the neighbour list is known to cover at the present positions.
     pub(super) covered: f64,
     /// The largest overlap of contours outside the set that the tolerance lets pass (length).
     pub(super) tolerated: f64,
+    /// Searches for pairs that touch, in each of two threads.
+    pub(super) searches: [Search; 2],
     pub(super) patch: Patch,
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) absurd: Option<(usize, f64)>,
@@ -176,10 +180,11 @@ impl ContactLaw {
             parted: false,
             slack: 0.0,
             image: Vec::new(),
-            products: Vec::new(),
+            products: Products::default(),
             bulges: Bulges::default(),
             covered: 0.0,
             tolerated: 0.0,
+            searches: Default::default(),
             patch: Patch::default(),
             absurd: None,
             offending: Vec::new(),

@@ -225,6 +225,16 @@ impl DuplicateContactList {
         begin as usize..end as usize
     }
 
+    /// The ends of the contacts in the row `entries` of particle `p`: `2c` for contact `c` of which it is the lower particle,
+    /// `2c + 1` of which it is the higher.
+    #[inline(always)]
+    pub(crate) fn ends(&self, p: u32, entries: Range<usize>) -> impl Iterator<Item = u32> {
+        let partners = self.partner[entries.clone()].iter();
+        let numbers = self.contact[entries].iter();
+        let end = move |(q, c): (&u32, &u32)| 2 * c + u32::from(*q < p);
+        partners.zip(numbers).map(end)
+    }
+
     /// All partners of particle `i`, ascending.
     ///
     /// # Panics

@@ -3,14 +3,11 @@
 pub use super::geometry::Geometry;
 
 use super::blocks::{Run, pairs_of};
-use super::fill::{Blocks, fill, fill_blocks};
 use super::list::ContactList;
-use super::product::{Number, product, product_of_blocks};
-use crate::domain::Vec2;
-use crate::droplet::kernel::Direction;
+use super::product::{Number, Products, product, product_of_blocks};
+use super::refresh::Room;
 use crate::packing::Packing;
 use crate::wide::wide;
-use core::f64::consts::PI;
 use core::ops::Range;
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
@@ -59,14 +56,17 @@ pub struct ContactMatrix {
     pub(super) particle: Vec<u32>,
     /// The ends of contacts in the blocks: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
     pub(super) end: Vec<u32>,
+    /// `−R_p/2πγ` of each particle.
+    pub(super) scale: Vec<f64>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     pub(super) value: Vec<f64>,
+    /// Whether [`refresh`](Self::refresh) keeps them: most steps need no more of them than their products with the forces.
+    pub(super) keeps_values: bool,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
     pub(super) scaled: Vec<f32>,
-    /// Whether `scaled` is of contacts that have come to rest or woken since.
-    pub(super) stale: bool,
-    /// Room for the directions of a run.
-    pub(super) toward: Vec<Direction>,
+    pub(super) known: Known,
+    /// Room for a run, in each of two threads.
+    pub(super) rooms: [Room; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
     pub(super) stretches: Vec<[usize; 2]>,
     /// The block of each particle, [`NO_BLOCK`] where it has no contact.
@@ -75,6 +75,17 @@ pub struct ContactMatrix {
     pub(super) pairs: Vec<[u32; 2]>,
     /// Whether contacts were added, or are at rest.
     pub(super) changed: bool,
+}
+
+/// Which entries are of the present positions and contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Known {
+    /// None: contacts have come, come to rest or woken since.
+    #[default]
+    Nothing,
+    /// Those in single precision.
+    Scaled,
+    All,
 }
 
 impl ContactMatrix {
@@ -107,17 +118,7 @@ impl ContactMatrix {
         line_tension: f64,
     ) {
         self.restructure(packing, contacts, geometry.duplicate(), line_tension);
-        let forces = vec![0.0; contacts.len()];
-        let products = &mut vec![0.0; contacts.len()];
-        let at = At {
-            packing,
-            forces: &forces,
-            per_radius: 1.0 / (2.0 * PI * line_tension),
-        };
-        wide(
-            #[inline(always)]
-            || self.fill(at, geometry, 0..self.runs.len(), products),
-        );
+        self.complete(geometry);
     }
 
     /// Whether the contacts are those that the structure was built of, in their order.
@@ -138,77 +139,6 @@ impl ContactMatrix {
     /// How many blocks stand alone because contacts were added.
     pub(crate) fn stragglers(&self) -> usize {
         self.runs.len() - self.sorted
-    }
-
-    /// Directions and values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
-    /// [`products`](Self::products) has it. `pairs` are the contacts by number, those of `geometry`.
-    ///
-    /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
-    /// those of its own stretch or of one before.
-    pub(crate) fn refresh(
-        &mut self,
-        geometry: &mut Geometry,
-        at: At<'_>,
-        pairs: &[[u32; 2]],
-        products: &mut Vec<f64>,
-    ) {
-        products.clear();
-        products.resize(self.len(), 0.0);
-        let sorted = self.sorted_contacts();
-        let stretches = core::mem::take(&mut self.stretches);
-        wide(
-            #[inline(always)]
-            || {
-                geometry.refresh(at.packing, pairs, sorted..pairs.len());
-                let [mut run, mut contact] = [0; 2];
-                for &[runs, contacts] in &stretches {
-                    geometry.refresh(at.packing, pairs, contact..contacts);
-                    self.fill(at, geometry, run..runs, products);
-                    [run, contact] = [runs, contacts];
-                }
-                self.fill(at, geometry, run..self.runs.len(), products);
-            },
-        );
-        self.stretches = stretches;
-        self.stale = false;
-    }
-
-    /// The values of some runs, scaled and not, and their products with the forces.
-    #[inline(always)]
-    fn fill(&mut self, at: At<'_>, geometry: &Geometry, runs: Range<usize>, products: &mut [f64]) {
-        let radii = at.packing.radii();
-        for run in &self.runs[runs] {
-            let ends = &self.end[run.ends()];
-            // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
-            if self.toward.len() < ends.len() {
-                self.toward.resize(ends.len(), Direction::of(Vec2::x()));
-            }
-            for (toward, end) in self.toward.iter_mut().zip(ends) {
-                *toward = geometry.toward(*end);
-            }
-            let particles = &self.particle[run.block..run.block + run.count];
-            let blocks = Blocks {
-                toward: &self.toward,
-                ends,
-                values: &mut self.value[run.values()],
-                scaled: &mut self.scaled[run.values()],
-                scaling: &self.scaling,
-                forces: at.forces,
-                products,
-            };
-            let scales = particles.iter();
-            let scales = scales.map(|p| -radii[*p as usize] * at.per_radius);
-            match run.size {
-                1 => {}
-                2 => fill::<2, 1>(blocks, scales),
-                3 => fill::<3, 3>(blocks, scales),
-                4 => fill::<4, 6>(blocks, scales),
-                5 => fill::<5, 10>(blocks, scales),
-                6 => fill::<6, 15>(blocks, scales),
-                7 => fill::<7, 21>(blocks, scales),
-                z => fill_blocks(z, blocks, scales),
-            }
-        }
     }
 
     /// Number of rows, the number of contacts.
@@ -299,39 +229,55 @@ impl ContactMatrix {
     /// ContactMatrix::default().multiply(&[], &mut []);
     /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        let n = self.len();
+        let (x, y) = (&x[..n], &mut y[..n]);
+        y.fill(0.0);
         wide(
             #[inline(always)]
-            || self.multiply_here(x, y),
+            || {
+                self.add_products(&self.value, 0..self.runs.len(), x, y);
+                self.add_diagonal(x, y);
+            },
         );
     }
 
-    /// [`multiply`](Self::multiply), to be inlined into loops that are compiled for wide vectors.
-    #[inline(always)]
-    pub(crate) fn multiply_here(&self, x: &[f64], y: &mut [f64]) {
-        let n = self.len();
-        let (x, y) = (&x[..n], &mut y[..n]);
+    /// [`multiply`](Self::multiply), by two threads if there are two.
+    pub(crate) fn multiply_into(&self, x: &[f64], y: &mut Products<f64>) {
         self.off_diagonal_products(x, y);
+        wide(
+            #[inline(always)]
+            || self.add_diagonal(x, y.sums_mut()),
+        );
+    }
+
+    #[inline(always)]
+    fn add_diagonal(&self, x: &[f64], y: &mut [f64]) {
         for ((y, x), d) in y.iter_mut().zip(x).zip(&self.diagonal) {
             *y += d * x;
         }
     }
 
-    /// The [`products`](Self::products) of the off-diagonal entries of `A` itself.
-    #[inline(always)]
-    pub(crate) fn off_diagonal_products(&self, x: &[f64], y: &mut [f64]) {
-        self.products(&self.value, x, y);
+    /// The [products](Self::add_products) of the off-diagonal entries of `A` itself.
+    pub(crate) fn off_diagonal_products(&self, x: &[f64], y: &mut Products<f64>) {
+        debug_assert!(self.is_complete(), "values of other positions");
+        self.products_into(&self.value, x, y);
     }
 
-    /// What the off-diagonal entries of `A` make of `x`, contact by contact. `values` are those of `A`, or others in their
-    /// places.
+    /// Adds to `y` what the off-diagonal entries of `A` in some runs make of `x`, contact by contact. `values` are those of `A`, or
+    /// others in their places.
     ///
     /// A contact has two ends. What comes from the others at one end is a sum in the order of the particle's partners; of the
     /// two sums it is the same which is added to which. So whatever numbers the contacts have and however the blocks are
     /// sorted, the bits are the same.
     #[inline(always)]
-    pub(crate) fn products<F: Number>(&self, values: &[F], x: &[F], y: &mut [F]) {
-        y.fill(F::default());
-        for run in &self.runs {
+    pub(super) fn add_products<F: Number>(
+        &self,
+        values: &[F],
+        runs: Range<usize>,
+        x: &[F],
+        y: &mut [F],
+    ) {
+        for run in &self.runs[runs] {
             let (e, v) = (&self.end[run.ends()], &values[run.values()]);
             match run.size {
                 1 => {}
@@ -346,35 +292,8 @@ impl ContactMatrix {
         }
     }
 
-    /// Brings the scaled values up to date.
-    pub(crate) fn rescale(&mut self) {
-        if !core::mem::take(&mut self.stale) {
-            return;
-        }
-        for run in &self.runs {
-            let ends = self.end[run.ends()].chunks_exact(run.size);
-            let values = self.value[run.values()].iter();
-            let couples = (1..run.size).flat_map(|b| (0..b).map(move |a| (a, b)));
-            let couples = ends.flat_map(|ends| couples.clone().map(|(a, b)| [ends[a], ends[b]]));
-            let scaled = self.scaled[run.values()].iter_mut();
-            for ((scaled, value), couple) in scaled.zip(values).zip(couples) {
-                let [a, b] = couple.map(|e| self.scaling[(e >> 1) as usize]);
-                *scaled = (value * (a * b)) as f32;
-            }
-        }
-    }
-
     /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision and in the places of the others.
     pub(crate) fn scaled(&self) -> &[f32] {
         &self.scaled
     }
-}
-
-/// What the values are computed at.
-#[derive(Clone, Copy)]
-pub(crate) struct At<'a> {
-    pub(crate) packing: &'a Packing,
-    pub(crate) forces: &'a [f64],
-    /// `1/2πγ`.
-    pub(crate) per_radius: f64,
 }

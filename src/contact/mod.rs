@@ -36,6 +36,8 @@ mod mend;
 mod patch;
 mod present;
 pub(crate) mod product;
+pub(crate) mod refresh;
+mod search;
 pub mod solver;
 mod tolerance;
 

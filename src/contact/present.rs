@@ -2,8 +2,8 @@
 //! the order of their numbers, with the same bits.
 
 use super::law::ContactLaw;
-use super::list::{ContactList, DuplicateContactList};
-use super::matrix::ContactMatrix;
+use super::list::ContactList;
+use super::matrix::{ContactMatrix, Geometry};
 use super::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::force::net_forces;
@@ -42,10 +42,10 @@ impl ContactLaw {
     /// ```
     #[must_use]
     pub fn matrix(&self) -> &ContactMatrix {
-        if self.is_in_order() {
+        if self.is_in_order() && self.matrix.is_complete() {
             &self.matrix
         } else {
-            self.present().matrix(&self.matrix)
+            self.present().matrix(&self.matrix, &self.geometry)
         }
     }
 
@@ -134,13 +134,13 @@ impl Present {
         self.contacts.view()
     }
 
-    /// The matrix of these contacts; `whole` is that of all numbers.
-    pub(super) fn matrix(&self, whole: &ContactMatrix) -> &ContactMatrix {
+    /// The matrix of these contacts; `whole` is that of all numbers, and `geometry` theirs.
+    pub(super) fn matrix(&self, whole: &ContactMatrix, geometry: &Geometry) -> &ContactMatrix {
         self.matrix.get_or_init(|| {
             let mut list = ContactList::default();
             list.rebuild(self.particles, &self.contacts.pairs);
-            let duplicate = DuplicateContactList::of(&list);
-            whole.of_some(&self.order, &list, &duplicate)
+            let geometry = geometry.of_some(&self.order, &list);
+            whole.of_some(&self.order, &list, &geometry)
         })
     }
 }

@@ -2,13 +2,68 @@
 //!
 //! A block names its contacts by their ends, `2c` or `2c + 1` for contact `c`.
 
+use crate::wide::wide;
 use core::ops::{AddAssign, Mul};
 
 /// What is multiplied: in double or in single precision.
-pub(crate) trait Number: Copy + Default + AddAssign + Mul<Output = Self> {}
+pub(crate) trait Number:
+    Copy + Default + AddAssign + Mul<Output = Self> + Send + Sync
+{
+}
 
 impl Number for f64 {}
 impl Number for f32 {}
+
+/// A column of products, which two threads may make: a contact gets something from each of its two ends, and which is added to
+/// which makes no difference.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Products<F> {
+    sums: Vec<F>,
+    /// What the second thread has made; empty if there is none.
+    more: Vec<F>,
+}
+
+impl<F: Number> Products<F> {
+    /// The products, once they are added up.
+    #[inline(always)]
+    pub(crate) fn sums(&self) -> &[F] {
+        &self.sums
+    }
+
+    #[inline(always)]
+    pub(crate) fn sums_mut(&mut self) -> &mut [F] {
+        &mut self.sums
+    }
+
+    /// Zeros for `length` contacts, for one thread.
+    pub(crate) fn alone(&mut self, length: usize) -> &mut [F] {
+        self.more.clear();
+        self.sums.clear();
+        self.sums.resize(length, F::default());
+        &mut self.sums
+    }
+
+    /// Zeros for `length` contacts, for two threads.
+    pub(crate) fn both(&mut self, length: usize) -> [&mut [F]; 2] {
+        for column in [&mut self.sums, &mut self.more] {
+            column.clear();
+            column.resize(length, F::default());
+        }
+        [&mut self.sums, &mut self.more]
+    }
+
+    /// Adds up what two threads have made.
+    pub(crate) fn add_up(&mut self) {
+        wide(
+            #[inline(always)]
+            || {
+                for (sum, more) in self.sums.iter_mut().zip(&self.more) {
+                    *sum += *more;
+                }
+            },
+        );
+    }
+}
 
 /// `y += A x` of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each.
 #[inline(always)]

@@ -114,9 +114,9 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
 }
 
 /// `dt_max √k` of the stiffest pair. The triangular lattice has `ω_max² = 6 k`, so that 2/√6 = 0.82 is the limit of
-/// stability of the densest contact network; half of it keeps clear, the whole multiplies the steps by five. Mean steps to
-/// 1e-6 at N = 1024, φ = 0.86: 4484 with 0.41 and 4589 with 0.5 (18 seeds); from 0.65 on several times as many.
-const DT_MAX: f64 = 0.41;
+/// stability of the densest contact network. Geometric means of the steps to 1e-6 at N = 1024 (40 seeds), for 0.41, 0.5 and
+/// 0.57: 4344, 3683, 3553 at φ = 0.86; 9114 and 7051 for the last two at 0.845, 1559 and 1595 at 0.92.
+const DT_MAX: f64 = 0.5;
 
 /// How far the neighbour list reaches beyond the disks at least and at most, in units of the largest radius `R`.
 ///

@@ -129,7 +129,7 @@ impl Scene {
         match self.dt_max {
             Some(dt_max) => page.field("Upper bound of the time step.", "dt_max", number(dt_max)),
             None => page.text(
-                "\n# Upper bound of the time step; without it, 1 / omega_max from the start's largest frequency.\n# dt_max = 0.2",
+                "\n# Upper bound of the time step; without it, 1.2 / omega_max from the start's largest frequency.\n# dt_max = 0.2",
             ),
         }
         page.field(

@@ -3,6 +3,7 @@
 use super::SolverError;
 use super::single::Single;
 use crate::contact::matrix::ContactMatrix;
+use crate::contact::product::Products;
 use crate::wide::wide;
 
 /// Conjugate gradients with the diagonal as preconditioner; owns its vectors, so a solve allocates nothing once they are
@@ -13,8 +14,10 @@ use crate::wide::wide;
 pub struct ConjugateGradient {
     residual: Vec<f64>,
     direction: Vec<f64>,
-    image: Vec<f64>,
+    image: Products<f64>,
     largest: f64,
+    /// `max |D^(−½) r|` of the residual that was computed last.
+    scaled: f64,
     single: Single,
 }
 
@@ -23,6 +26,9 @@ pub struct ConjugateGradient {
 pub(crate) enum Progress {
     /// To its end, after so many iterations.
     Done(usize),
+    /// To where the residual is computed anew, after so many iterations, which needs the
+    /// [values](ContactMatrix::is_complete).
+    NeedsValues(usize),
     /// To where single precision ends, after so many iterations: double precision sums in the order of the contacts and needs a
     /// matrix that [is whole](ContactMatrix::is_whole).
     NeedsWhole(usize),
@@ -63,7 +69,7 @@ impl ConjugateGradient {
     ) -> Result<usize, SolverError> {
         match self.begin(matrix, overlaps, forces, (tolerance, loosely), None)? {
             Progress::Done(iterations) => Ok(iterations),
-            Progress::NeedsWhole(iterations) => {
+            Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => {
                 self.finish(matrix, overlaps, forces, tolerance, iterations)
             }
         }
@@ -79,15 +85,33 @@ impl ConjugateGradient {
         overlaps: &[f64],
         forces: &mut [f64],
         (tolerance, loosely): (f64, bool),
-        mut products: Option<&[f64]>,
+        products: Option<&[f64]>,
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
         self.single.prepare(matrix.len());
-        let mut iterations = 0;
+        self.go_on(
+            matrix,
+            overlaps,
+            forces,
+            (tolerance, loosely),
+            (products, 0),
+        )
+    }
+
+    /// [`begin`](Self::begin), or what comes after so many iterations.
+    pub(crate) fn go_on(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        (tolerance, loosely): (f64, bool),
+        (mut products, mut iterations): (Option<&[f64]>, usize),
+    ) -> Result<Progress, SolverError> {
         loop {
             let before = self.largest;
             self.largest = match products.take() {
                 Some(products) => self.residual_of(matrix, (overlaps, forces, products)),
+                None if !matrix.is_complete() => return Ok(Progress::NeedsValues(iterations)),
                 None => self.true_residual(matrix, overlaps, forces),
             };
             if self.largest <= tolerance {
@@ -99,7 +123,7 @@ impl ConjugateGradient {
             if iterations > 0 && self.largest > 0.5 * before {
                 return Ok(Progress::NeedsWhole(iterations));
             }
-            let residual = &self.residual;
+            let residual = (&self.residual[..], self.scaled);
             let corrected = self.single.correct(matrix, residual, forces, tolerance);
             let Some((more, bound)) = corrected else {
                 return Ok(Progress::NeedsWhole(iterations));
@@ -138,7 +162,7 @@ impl ConjugateGradient {
 
     fn prepare(&mut self, matrix: &ContactMatrix) {
         let n = matrix.len();
-        for v in [&mut self.residual, &mut self.direction, &mut self.image] {
+        for v in [&mut self.residual, &mut self.direction] {
             v.resize(n, 0.0);
         }
     }
@@ -158,22 +182,24 @@ impl ConjugateGradient {
 
     /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); contacts at rest have none.
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
-        wide(
+        matrix.off_diagonal_products(forces, &mut self.image);
+        let columns = (overlaps, forces, self.image.sums());
+        let largest = wide(
             #[inline(always)]
-            || {
-                matrix.off_diagonal_products(forces, &mut self.image);
-                let columns = (overlaps, forces, &self.image[..]);
-                subtract(&mut self.residual, matrix, columns)
-            },
-        )
+            || subtract(&mut self.residual, matrix, columns),
+        );
+        self.scaled = largest[1];
+        largest[0]
     }
 
     /// [`true_residual`](Self::true_residual) with the products of the off-diagonal entries given.
     fn residual_of(&mut self, matrix: &ContactMatrix, columns: (&[f64], &[f64], &[f64])) -> f64 {
-        wide(
+        let largest = wide(
             #[inline(always)]
             || subtract(&mut self.residual, matrix, columns),
-        )
+        );
+        self.scaled = largest[1];
+        largest[0]
     }
 
     /// Iterates from the residual at hand until the recurrence's residual meets the tolerance.
@@ -209,8 +235,8 @@ impl ConjugateGradient {
             for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(scaling) {
                 *p = r * (s * s) + beta * *p;
             }
-            matrix.multiply_here(&self.direction, &mut self.image);
-            let curvature = dot(&self.direction, &self.image);
+            matrix.multiply_into(&self.direction, &mut self.image);
+            let curvature = dot(&self.direction, self.image.sums());
             if curvature.is_nan() || curvature <= 0.0 {
                 let contact = largest_entry(&self.direction);
                 return Err(SolverError::NotPositiveDefinite {
@@ -222,7 +248,7 @@ impl ConjugateGradient {
             let (next, largest) = advance(
                 forces,
                 &mut self.residual,
-                (&self.direction, &self.image),
+                (&self.direction, self.image.sums()),
                 scaling,
                 alpha,
             );
@@ -238,13 +264,14 @@ impl ConjugateGradient {
     }
 }
 
-/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest magnitude, NaN if any is.
+/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest `|r|` and the
+/// largest `|D^(−½) r|`, NaN if any is.
 #[inline(always)]
 fn subtract(
     residual: &mut [f64],
     matrix: &ContactMatrix,
     (overlaps, forces, products): (&[f64], &[f64], &[f64]),
-) -> f64 {
+) -> [f64; 2] {
     let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
     let left = |d: f64, f: f64, q: f64, a: f64, s: f64| {
         let r = d - (a * f + q);
@@ -256,19 +283,23 @@ fn subtract(
     let (q8, q_rest) = products.as_chunks::<8>();
     let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
     let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
-    let mut largest = [0.0; 8];
+    let (mut largest, mut scaled) = ([0.0; 8], [0.0; 8]);
     let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(q8));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
             r[k] = left(d[k], f[k], q[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
+            scaled[k] = larger(scaled[k], (r[k] * s[k]).abs());
         }
     }
-    let mut most = largest.into_iter().fold(0.0, larger);
+    let mut most = [largest, scaled].map(
+        #[inline(always)]
+        |most| most.into_iter().fold(0.0, larger),
+    );
     let rows = r_rest.iter_mut().zip(d_rest).zip(f_rest.iter().zip(q_rest));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a_rest.iter().zip(s_rest)) {
         *r = left(*d, *f, *q, *a, *s);
-        most = larger(most, r.abs());
+        most = [larger(most[0], r.abs()), larger(most[1], (*r * s).abs())];
     }
     most
 }

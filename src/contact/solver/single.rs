@@ -15,6 +15,9 @@
 //! vectors or anything but the contacts. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
 
 use crate::contact::matrix::ContactMatrix;
+use crate::contact::product::Products;
+use crate::contact::refresh::FEWEST_FOR_TWO;
+use crate::threads::{are_two, both};
 use crate::wide::wide;
 
 /// How far one round lowers the residual at most.
@@ -46,7 +49,7 @@ const CHAINS: usize = 16;
 pub(super) struct Single {
     residual: Vec<f32>,
     direction: Vec<f32>,
-    image: Vec<f32>,
+    image: Products<f32>,
     correction: Vec<f32>,
 }
 
@@ -56,44 +59,26 @@ impl Single {
         for v in [
             &mut self.residual,
             &mut self.direction,
-            &mut self.image,
             &mut self.correction,
         ] {
             v.resize(contacts, 0.0);
         }
     }
 
-    /// Corrects `forces`, which leave `residual` (length), so that it falls to `goal`, or as far as a round goes. Returns
-    /// the iterations and an estimate of the residual then; `None`, and nothing done, where single precision is not enough.
+    /// Corrects `forces`, which leave the `residual` (length; with its largest `|D^(−½) r|`), so that it falls to `goal`, or as far
+    /// as a round goes. Returns the iterations and an estimate of the residual then; `None`, and nothing done, where single
+    /// precision is not enough.
     pub(super) fn correct(
         &mut self,
         matrix: &ContactMatrix,
-        residual: &[f64],
-        forces: &mut [f64],
-        goal: f64,
-    ) -> Option<(usize, f64)> {
-        wide(
-            #[inline(always)]
-            || self.correct_here(matrix, residual, forces, goal),
-        )
-    }
-
-    #[inline(always)]
-    fn correct_here(
-        &mut self,
-        matrix: &ContactMatrix,
-        residual: &[f64],
+        (residual, scale): (&[f64], f64),
         forces: &mut [f64],
         goal: f64,
     ) -> Option<(usize, f64)> {
         let scaling = matrix.scaling();
-        let scale = largest_product(residual, scaling);
         let inverse = 1.0 / scale;
         if !(scale.is_finite() && inverse.is_finite()) {
             return None;
-        }
-        for ((own, r), s) in self.residual.iter_mut().zip(residual).zip(scaling) {
-            *own = (r * s * inverse) as f32;
         }
         // |r_c| is at most this many times what is left of entry c.
         let length = scale * matrix.largest_root();
@@ -102,16 +87,24 @@ impl Single {
         self.correction.fill(0.0);
         // Bounds of the entries of residual, direction and image.
         let (mut most_r, mut most_p) = (1.0, 0.0);
-        let ones = Products::below(most_r, most_r)?;
-        let squares = self.residual.iter().map(|r| ones.integer(*r, *r));
-        let (mut rr, mut beta) = (ones.value(squares.map(i64::from).sum()), 0.0);
+        let ones = Rounding::below(most_r, most_r)?;
+        let squares = wide(
+            #[inline(always)]
+            || {
+                for ((own, r), s) in self.residual.iter_mut().zip(residual).zip(scaling) {
+                    *own = (r * s * inverse) as f32;
+                }
+                let squares = self.residual.iter().map(|r| ones.integer(*r, *r));
+                squares.map(i64::from).sum()
+            },
+        );
+        let (mut rr, mut beta) = (ones.value(squares), 0.0);
         for iteration in 1..=ITERATIONS {
-            for (p, r) in self.direction.iter_mut().zip(&self.residual) {
-                *p = r + beta * *p;
-            }
+            turn(&mut self.direction, &self.residual, beta);
             most_p = most_r + beta.abs() * most_p;
-            matrix.products(matrix.scaled(), &self.direction, &mut self.image);
-            let (curvature, most_q) = collect(&mut self.image, &self.direction, most_p)?;
+            matrix.products_into(matrix.scaled(), &self.direction, &mut self.image);
+            let image = self.image.sums_mut();
+            let (curvature, most_q) = collect(image, &self.direction, most_p)?;
             if curvature <= 0.0 {
                 return None;
             }
@@ -119,7 +112,7 @@ impl Single {
             let (next, largest) = advance(
                 &mut self.correction,
                 &mut self.residual,
-                (&self.direction, &self.image),
+                (&self.direction, self.image.sums()),
                 alpha,
                 most_r + alpha.abs() * most_q,
             )?;
@@ -128,9 +121,14 @@ impl Single {
                 if !largest_correction.is_finite() {
                     return None;
                 }
-                for ((f, u), s) in forces.iter_mut().zip(&self.correction).zip(scaling) {
-                    *f += f64::from(*u) * (scale * s);
-                }
+                wide(
+                    #[inline(always)]
+                    || {
+                        for ((f, u), s) in forces.iter_mut().zip(&self.correction).zip(scaling) {
+                            *f += f64::from(*u) * (scale * s);
+                        }
+                    },
+                );
                 let rounding = ROUNDING * f64::from(largest_correction);
                 return Some((iteration, (f64::from(largest) + rounding) * length));
             }
@@ -141,12 +139,55 @@ impl Single {
     }
 }
 
+/// Where a column of so many numbers is cut for two threads; at its end if it is too short for both.
+fn half(length: usize) -> usize {
+    if are_two() && length >= FEWEST_FOR_TWO {
+        (length / 2).next_multiple_of(STRETCH)
+    } else {
+        length
+    }
+}
+
+/// The next direction, `p = r + β p`.
+fn turn(direction: &mut [f32], residual: &[f32], beta: f32) {
+    let part = |direction: &mut [f32], residual: &[f32]| {
+        wide(
+            #[inline(always)]
+            || {
+                for (p, r) in direction.iter_mut().zip(residual) {
+                    *p = r + beta * *p;
+                }
+            },
+        );
+    };
+    let half = half(direction.len());
+    let (p, more_p) = direction.split_at_mut(half);
+    let (r, more_r) = residual.split_at(half);
+    both(|| part(p, r), || part(more_p, more_r));
+}
+
 /// The image `q = p + (Â − 1) p`, of which `image` has the second part; returns `pᵀ q` and the largest `|q|`. `most` bounds
 /// `|p|`. `None` if a number is none, or out of hand.
-#[inline(always)]
 fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)> {
-    let products = Products::below(most, ROW * most)?;
-    let (mut total, mut largest) = (0, [0; CHAINS]);
+    let rounding = Rounding::below(most, ROW * most)?;
+    let [mut one, mut other] = [Sum::default(); 2];
+    let part = |q: &mut [f32], p: &[f32], sum: &mut Sum| {
+        wide(
+            #[inline(always)]
+            || collect_here(q, p, rounding, sum),
+        );
+    };
+    let half = half(image.len());
+    let (q, more_q) = image.split_at_mut(half);
+    let (p, more_p) = direction.split_at(half);
+    both(|| part(q, p, &mut one), || part(more_q, more_p, &mut other));
+    let (total, largest) = one.with(other);
+    (largest <= ROW * most).then(|| (rounding.value(total), largest))
+}
+
+#[inline(always)]
+fn collect_here(image: &mut [f32], direction: &[f32], rounding: Rounding, sum: &mut Sum) {
+    let mut largest = [0; CHAINS];
     for (q, p) in image.chunks_mut(STRETCH).zip(direction.chunks(STRETCH)) {
         let (q16, q_rest) = q.as_chunks_mut::<CHAINS>();
         let (p16, p_rest) = p.as_chunks::<CHAINS>();
@@ -154,24 +195,22 @@ fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)
         for (q, p) in q16.iter_mut().zip(p16) {
             for k in 0..CHAINS {
                 q[k] += p[k];
-                sums[k] = products.add(sums[k], p[k], q[k]);
+                sums[k] = rounding.add(sums[k], p[k], q[k]);
                 largest[k] = largest[k].max(magnitude(q[k]));
             }
         }
-        total += sum_of(sums, q16.len());
+        sum.total += sum_of(sums, q16.len());
         for (q, p) in q_rest.iter_mut().zip(p_rest) {
             *q += p;
-            total += i64::from(products.integer(*p, *q));
+            sum.total += i64::from(rounding.integer(*p, *q));
             largest[0] = largest[0].max(magnitude(*q));
         }
     }
-    let largest = f32::from_bits(largest.into_iter().fold(0, u32::max));
-    (largest <= ROW * most).then(|| (products.value(total), largest))
+    sum.largest = largest.into_iter().fold(0, u32::max);
 }
 
 /// A move by `α` along the direction; returns `rᵀ r` and the largest `|r|` behind it. `most` bounds `|r|`. `None` if a number is
 /// none, or out of hand.
-#[inline(always)]
 fn advance(
     correction: &mut [f32],
     residual: &mut [f32],
@@ -180,8 +219,35 @@ fn advance(
     most: f32,
 ) -> Option<(f64, f32)> {
     // A little more, for the rounding of the residual.
-    let products = Products::below(1.01 * most, 1.01 * most)?;
-    let (mut total, mut largest) = (0, [0; CHAINS]);
+    let rounding = Rounding::below(1.01 * most, 1.01 * most)?;
+    let [mut one, mut other] = [Sum::default(); 2];
+    let part = |u: &mut [f32], r: &mut [f32], by: (&[f32], &[f32]), sum: &mut Sum| {
+        wide(
+            #[inline(always)]
+            || advance_here((u, r), by, (alpha, rounding), sum),
+        );
+    };
+    let half = half(residual.len());
+    let (u, more_u) = correction.split_at_mut(half);
+    let (r, more_r) = residual.split_at_mut(half);
+    let (p, more_p) = direction.split_at(half);
+    let (q, more_q) = image.split_at(half);
+    both(
+        || part(u, r, (p, q), &mut one),
+        || part(more_u, more_r, (more_p, more_q), &mut other),
+    );
+    let (total, largest) = one.with(other);
+    (largest <= 1.01 * most).then(|| (rounding.value(total), largest))
+}
+
+#[inline(always)]
+fn advance_here(
+    (correction, residual): (&mut [f32], &mut [f32]),
+    (direction, image): (&[f32], &[f32]),
+    (alpha, rounding): (f32, Rounding),
+    sum: &mut Sum,
+) {
+    let mut largest = [0; CHAINS];
     let moved = correction.chunks_mut(STRETCH);
     let moved = moved.zip(residual.chunks_mut(STRETCH));
     let by = direction.chunks(STRETCH).zip(image.chunks(STRETCH));
@@ -195,21 +261,34 @@ fn advance(
             for k in 0..CHAINS {
                 u[k] += alpha * p[k];
                 r[k] -= alpha * q[k];
-                sums[k] = products.add(sums[k], r[k], r[k]);
+                sums[k] = rounding.add(sums[k], r[k], r[k]);
                 largest[k] = largest[k].max(magnitude(r[k]));
             }
         }
-        total += sum_of(sums, r16.len());
+        sum.total += sum_of(sums, r16.len());
         let rest = u_rest.iter_mut().zip(r_rest).zip(p_rest.iter().zip(q_rest));
         for ((u, r), (p, q)) in rest {
             *u += alpha * p;
             *r -= alpha * q;
-            total += i64::from(products.integer(*r, *r));
+            sum.total += i64::from(rounding.integer(*r, *r));
             largest[0] = largest[0].max(magnitude(*r));
         }
     }
-    let largest = f32::from_bits(largest.into_iter().fold(0, u32::max));
-    (largest <= 1.01 * most).then(|| (products.value(total), largest))
+    sum.largest = largest.into_iter().fold(0, u32::max);
+}
+
+/// What one thread has summed, and the bits of the largest magnitude that it met.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    total: i64,
+    largest: u32,
+}
+
+impl Sum {
+    fn with(self, other: Self) -> (i64, f32) {
+        let largest = self.largest.max(other.largest);
+        (self.total + other.total, f32::from_bits(largest))
+    }
 }
 
 /// The bits of `|x|`: they order as the magnitudes do, and NaN comes above all.
@@ -232,30 +311,13 @@ fn largest_magnitude(v: &[f32]) -> f32 {
     f32::from_bits(most.into_iter().chain(rest).fold(0, u32::max))
 }
 
-/// The largest `|a b|`, NaN if there is one.
-#[inline(always)]
-fn largest_product(a: &[f64], b: &[f64]) -> f64 {
-    let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
-    let (a8, a_rest) = a.as_chunks::<8>();
-    let (b8, b_rest) = b.as_chunks::<8>();
-    let mut most = [0.0; 8];
-    for (a, b) in a8.iter().zip(b8) {
-        for k in 0..8 {
-            most[k] = larger(most[k], (a[k] * b[k]).abs());
-        }
-    }
-    let most = most.into_iter().fold(0.0, larger);
-    let rest = a_rest.iter().zip(b_rest).map(|(a, b)| (a * b).abs());
-    rest.fold(most, larger)
-}
-
 /// Products as integers: multiples of [`STEPS`]⁻¹ of a power of two above all of them.
 #[derive(Clone, Copy)]
-struct Products {
+struct Rounding {
     scale: f32,
 }
 
-impl Products {
+impl Rounding {
     /// For products of numbers with magnitudes up to `a` and up to `b`; `None` if one is no number or too far from 1.
     #[inline(always)]
     fn below(a: f32, b: f32) -> Option<Self> {

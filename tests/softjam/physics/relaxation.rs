@@ -76,10 +76,13 @@ fn largest_force_falls_below_the_threshold_and_later_near_jamming() {
                 run.advance().unwrap();
             }
             assert_eq!(run.status(), Status::Converged, "φ = {phi}, seed {seed}");
+            // So near to jamming a few packings are not jammed at all, and their disks hardly press on each other.
+            let held = run.observables().backbone_contacts > 0;
             assert!(
-                run.f_max() <= 1e-10 && first > 1e-4,
+                run.f_max() <= 1e-10 && (first > 1e-4 || !held),
                 "φ = {phi}, seed {seed}"
             );
+            assert!(held || phi < 0.85, "φ = {phi}, seed {seed} is not jammed");
             run.step()
         });
         let counts: Vec<u64> = runs.collect();
