@@ -38,10 +38,13 @@ pub enum ThreadsError {
     /// The system has no more threads.
     #[error("cannot start a second thread: {0}")]
     Start(#[from] rayon::ThreadPoolBuildError),
+    /// The system has no more threads to wait in.
+    #[error("cannot start a thread to wait in: {0}")]
+    Wait(#[from] std::io::Error),
 }
 
-/// Does `work` with so many `threads`, 1 or 2: what it relaxes is relaxed by both. The second takes all of its core until `work` is
-/// done.
+/// Does `work` with so many `threads`, 1 (which adds none) or 2. The second shares the steps of packings with 16 384 contacts or
+/// more, from some 7000 particles on; it takes all of its core until `work` is done, whatever the size.
 ///
 /// # Errors
 ///
@@ -71,26 +74,39 @@ pub fn with<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> Result<
         .num_threads(threads)
         .thread_name(|k| format!("softjam-{k}"))
         .build()?;
+    let by_both = || pool.install(|| beside_another(work));
+    if rayon::current_thread_index().is_none() {
+        return Ok(by_both());
+    }
+    // A thread of the caller's own pool would begin the next of its tasks while it waits, and that one another, all on one stack.
+    std::thread::scope(|scope| {
+        let waiting = std::thread::Builder::new().spawn_scoped(scope, by_both)?;
+        waiting
+            .join()
+            .map_or_else(|panic| std::panic::resume_unwind(panic), Ok)
+    })
+}
+
+/// Does `work` while another thread of the pool stays awake.
+fn beside_another<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     let (awake, done) = (AtomicBool::new(false), AtomicBool::new(false));
-    Ok(pool.install(|| {
-        rayon::scope(|scope| {
-            // Whatever becomes of the work, the other thread is let go.
-            let _end = End(&done);
-            scope.spawn(|_| {
-                awake.store(true, Ordering::Release);
-                while !done.load(Ordering::Acquire) {
-                    if rayon::yield_now() != Some(rayon::Yield::Executed) {
-                        spin_loop();
-                    }
+    rayon::scope(|scope| {
+        // Whatever becomes of the work, the other thread is let go.
+        let _end = End(&done);
+        scope.spawn(|_| {
+            awake.store(true, Ordering::Release);
+            while !done.load(Ordering::Acquire) {
+                if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                    spin_loop();
                 }
-            });
-            while !awake.load(Ordering::Acquire) {
-                std::thread::yield_now();
             }
-            PAIRED.set(true);
-            work()
-        })
-    }))
+        });
+        while !awake.load(Ordering::Acquire) {
+            std::thread::yield_now();
+        }
+        PAIRED.set(true);
+        work()
+    })
 }
 
 /// Ends the second thread's waiting when it goes out of scope.
@@ -102,16 +118,16 @@ impl Drop for End<'_> {
     }
 }
 
-/// Whether [`both`] uses two threads here.
+/// Whether this thread has a second one at hand.
 #[inline]
 pub(crate) fn are_two() -> bool {
     PAIRED.get()
 }
 
-/// Does one thing and the other: at the same time, if there are two threads.
+/// Does one thing and the other: at the same time if `two`, which says that there [are](are_two).
 #[inline]
-pub(crate) fn both(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
-    if are_two() {
+pub(crate) fn both(two: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    if two {
         rayon::join(one, other);
     } else {
         one();

@@ -262,6 +262,13 @@ fn size(table: &Table) -> String {
             Line::Solid,
         ),
         series(
+            "– with two threads",
+            of("0.86", "two_threads_ns_per_step_and_particle"),
+            BLUE,
+            Marker::Circle,
+            Line::Dashed,
+        ),
+        series(
             "disks, φ = 0.86",
             of("0.86", "disks_ns_per_step_and_particle"),
             SKY,

@@ -76,7 +76,7 @@ pub fn all() -> Vec<Family> {
         ),
         family(
             "dense, short steps",
-            "the same with dt_max = 0.04, about a third of the default",
+            "the same with dt_max = 0.04, about a quarter of the default",
             || dense(Some(0.04)),
         ),
         family(

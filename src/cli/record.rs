@@ -63,7 +63,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RUN.mcap", help_heading = RECORDING)]
     mcap: Option<PathBuf>,
 
-    /// Threads that relax, 1 or 2: the same bits, sooner for one packing of some 10000 particles or more. For many runs, start
+    /// Threads that relax, 1 or 2: the same bits, sooner for one packing of some 7000 particles or more. For many runs, start
     /// several at a time instead.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), help_heading = RELAXATION)]
     threads: u8,

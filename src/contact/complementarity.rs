@@ -342,14 +342,12 @@ impl ContactLaw {
             tolerance,
         };
         let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
-        let half = if self.matrix.is_for_two() {
-            self.others.len() / 2
-        } else {
-            self.others.len()
-        };
+        let two = self.matrix.is_for_two();
+        let half = if two { self.others.len() / 2 } else { 0 };
         let (some, more) = self.others.split_at(half);
         let [one, other] = &mut self.searches;
         both(
+            two,
             || one.look_at(at, some.iter().copied()),
             || other.look_at(at, more.iter().copied().chain(at_rest)),
         );

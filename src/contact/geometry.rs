@@ -108,7 +108,7 @@ impl Geometry {
         );
     }
 
-    /// Takes over which particles touch; positions follow in [`refresh`](Self::refresh).
+    /// Takes over which particles touch; positions follow with [`Part::refresh`].
     pub(crate) fn restructure(&mut self, contacts: &ContactList) {
         self.duplicate.rebuild(contacts);
         self.normals.resize(contacts.len(), Vec2::zeros());
@@ -324,7 +324,8 @@ impl Part<'_> {
     }
 }
 
-/// [`Geometry::gap`] with the forces on a particle, and the directions they come from, given by `forces`.
+/// The gap between the deformed contours of particles `i < j` that are not in contact (length); the forces on a particle, and the
+/// directions they come from, are given by `forces`.
 pub(super) fn gap_of<F: Iterator<Item = (f64, Direction)>>(
     packing: &Packing,
     line_tension: f64,

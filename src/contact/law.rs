@@ -132,6 +132,8 @@ pub struct Work {
     pub assemblies: u64,
     /// Structures of the contact set (lists, places in `A`) built.
     pub structures: u64,
+    /// Matrices whose entries were kept in double precision; far above round-off their products with the forces are enough.
+    pub values: u64,
     /// Symbolic factorisations; none unless the solver is the sparse Cholesky.
     pub symbolic: u64,
     /// Distances computed of pairs outside the set.
@@ -296,6 +298,7 @@ impl ContactLaw {
         Work {
             neighbor_lists: self.neighbors.builds(),
             symbolic: self.solver.symbolic_factorizations(),
+            values: self.matrix.kept,
             ..self.work
         }
     }

@@ -65,6 +65,8 @@ pub struct ContactMatrix {
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
     pub(super) scaled: Vec<f32>,
     pub(super) known: Known,
+    /// How often the values were kept.
+    pub(super) kept: u64,
     /// Room for a run, in each of two threads.
     pub(super) rooms: [Room; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
@@ -81,10 +83,11 @@ pub struct ContactMatrix {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Known {
     /// None: contacts have come, come to rest or woken since.
-    #[default]
     Nothing,
     /// Those in single precision.
     Scaled,
+    /// All; an empty matrix lacks none.
+    #[default]
     All,
 }
 

@@ -53,6 +53,7 @@ impl ContactMatrix {
         products: &mut Products<f64>,
     ) -> f64 {
         self.known = if self.keeps_values {
+            self.kept += 1;
             Known::All
         } else {
             Known::Scaled
@@ -77,6 +78,7 @@ impl ContactMatrix {
             || self.fill((geometry.directions(), &zeros), all, products, true),
         );
         self.known = Known::All;
+        self.kept += 1;
     }
 
     /// Whether all values are of the present positions and contacts.
@@ -84,7 +86,7 @@ impl ContactMatrix {
         self.known == Known::All
     }
 
-    /// [`products`](Self::products), by two threads if there are two.
+    /// [`add_products`](Self::add_products) to zeros, by two threads if there are two.
     pub(crate) fn products_into<F: Number>(&self, values: &[F], x: &[F], y: &mut Products<F>) {
         let all = self.runs.len();
         let part = |runs: Range<usize>, y: &mut [F]| {
@@ -96,7 +98,7 @@ impl ContactMatrix {
         if self.is_for_two() {
             let middle = self.middle();
             let [one, other] = y.both(self.len());
-            both(|| part(0..middle, one), || part(middle..all, other));
+            both(true, || part(0..middle, one), || part(middle..all, other));
             y.add_up();
         } else {
             part(0..all, y.alone(self.len()));
@@ -161,6 +163,7 @@ impl ContactMatrix {
         let half = pairs.len() / 2;
         let [one, other] = geometry.halves(half);
         both(
+            true,
             || refresh(one, &pairs[..half]),
             || refresh(other, &pairs[half..]),
         );
@@ -175,6 +178,7 @@ impl ContactMatrix {
         };
         let [y, more] = products.both(length);
         both(
+            true,
             || fill(0..middle, &mut one, y),
             || fill(middle..all, &mut other, more),
         );

@@ -142,7 +142,7 @@ impl Single {
 /// Where a column of so many numbers is cut for two threads; at its end if it is too short for both.
 fn half(length: usize) -> usize {
     if are_two() && length >= FEWEST_FOR_TWO {
-        (length / 2).next_multiple_of(STRETCH)
+        (length / 2).next_multiple_of(STRETCH).min(length)
     } else {
         length
     }
@@ -163,7 +163,8 @@ fn turn(direction: &mut [f32], residual: &[f32], beta: f32) {
     let half = half(direction.len());
     let (p, more_p) = direction.split_at_mut(half);
     let (r, more_r) = residual.split_at(half);
-    both(|| part(p, r), || part(more_p, more_r));
+    let two = !more_p.is_empty();
+    both(two, || part(p, r), || part(more_p, more_r));
 }
 
 /// The image `q = p + (Â − 1) p`, of which `image` has the second part; returns `pᵀ q` and the largest `|q|`. `most` bounds
@@ -180,7 +181,12 @@ fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)
     let half = half(image.len());
     let (q, more_q) = image.split_at_mut(half);
     let (p, more_p) = direction.split_at(half);
-    both(|| part(q, p, &mut one), || part(more_q, more_p, &mut other));
+    let two = !more_q.is_empty();
+    both(
+        two,
+        || part(q, p, &mut one),
+        || part(more_q, more_p, &mut other),
+    );
     let (total, largest) = one.with(other);
     (largest <= ROW * most).then(|| (rounding.value(total), largest))
 }
@@ -232,7 +238,9 @@ fn advance(
     let (r, more_r) = residual.split_at_mut(half);
     let (p, more_p) = direction.split_at(half);
     let (q, more_q) = image.split_at(half);
+    let two = !more_u.is_empty();
     both(
+        two,
         || part(u, r, (p, q), &mut one),
         || part(more_u, more_r, (more_p, more_q), &mut other),
     );

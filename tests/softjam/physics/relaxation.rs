@@ -10,6 +10,8 @@ use softjam::disks::{self, DiskParameters};
 use softjam::frame::Frame;
 use softjam::relax::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Start, start};
+use softjam::threads;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 #[test]
 fn seed_rule_and_contact_law_end_in_the_same_packing() {
@@ -100,6 +102,69 @@ fn largest_force_falls_below_the_threshold_and_later_near_jamming() {
             "φ = {phi} against {near} steps at 0.843"
         );
     }
+}
+
+#[test]
+fn two_threads_walk_the_bits_of_one() {
+    let scene = Scene {
+        disks: DiskParameters {
+            steps: 150,
+            ..DiskParameters::default()
+        },
+        ..scene(9000, 0.88, 3)
+    };
+    let walk = || {
+        let mut run = Relaxation::new(&scene).unwrap();
+        let mut digests = Vec::new();
+        for _ in 0..25 {
+            run.advance().unwrap();
+            digests.push(run.frame().digest());
+        }
+        let work = run.law().work();
+        assert!(
+            run.contacts().forces.len() > 16_384,
+            "enough for a second thread"
+        );
+        assert!(work.patches > 0 && work.gaps > 0, "contacts came and went");
+        (digests, work)
+    };
+    let [one, two] = [1, 2].map(|threads| threads::with(threads, walk).unwrap());
+    assert_eq!(one, two);
+}
+
+#[test]
+fn a_second_thread_is_had_in_a_pool_of_the_callers() {
+    let started = AtomicU32::new(0);
+    let most = AtomicU32::new(0);
+    let task = |k: u32| {
+        let result = threads::with(2, || {
+            most.fetch_max(started.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            let mut run = Relaxation::new(&scene(32, 0.9, u64::from(k))).unwrap();
+            (0..20).for_each(|_| run.advance().unwrap());
+            started.fetch_sub(1, Ordering::SeqCst);
+            run.step()
+        });
+        assert_eq!(result.unwrap(), 20);
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(2)
+        .build()
+        .unwrap();
+    let task = &task;
+    pool.scope(|scope| {
+        for k in 1..=40 {
+            scope.spawn(move |_| task(k));
+        }
+    });
+    let most = most.into_inner();
+    assert!(most <= 2, "{most} runs at a time on two threads");
+}
+
+#[test]
+fn a_panic_beside_a_second_thread_is_passed_on() {
+    let result = std::panic::catch_unwind(|| threads::with(2, || panic!("as told")));
+    let panic = result.unwrap_err();
+    assert_eq!(panic.downcast_ref::<&str>(), Some(&"as told"));
 }
 
 #[test]
