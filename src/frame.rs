@@ -125,6 +125,12 @@ impl Frame {
         *blake3::hash(&buffer).as_bytes()
     }
 
+    /// The bytes of its columns.
+    #[cfg(feature = "recording")]
+    pub(crate) fn bytes(&self) -> usize {
+        32 * self.positions.len() + 16 * self.contacts.len()
+    }
+
     /// Checks that the frame can belong to `particles` particles in `domain`: lengths, order of contacts, positions in
     /// the box, everything finite. A frame from a file is hostile until it has passed.
     ///

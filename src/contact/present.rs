@@ -24,6 +24,19 @@ impl ContactLaw {
         }
     }
 
+    /// Pairs and forces of [`contacts`](Self::contacts), copied.
+    pub(crate) fn pairs_and_forces(&self) -> (Vec<[u32; 2]>, Vec<f64>) {
+        if self.is_in_order() {
+            return (self.pairs.clone(), self.forces.clone());
+        }
+        let order = in_order(&self.pairs, &self.matrix);
+        let numbers = || order.iter().map(|c| *c as usize);
+        (
+            numbers().map(|c| self.pairs[c]).collect(),
+            numbers().map(|c| self.forces[c]).collect(),
+        )
+    }
+
     /// The contacts in the order of their numbers, those at rest among them with no force.
     pub(crate) fn numbered(&self) -> Contacts<'_> {
         Contacts {

@@ -126,7 +126,7 @@ impl Rows {
             self.pending
                 .states
                 .row(snapshot.nanoseconds, frame, &digest);
-            self.pending.bytes += 32 * frame.positions.len() + 16 * frame.contacts.len();
+            self.pending.bytes += frame.bytes();
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::pipeline::Pipeline;
 use super::{Format, Header, McapRecorder, Outcome, RecordError, Recorder, Snapshot};
+use crate::frame::Frame;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
@@ -12,9 +13,10 @@ use std::thread::JoinHandle;
 /// Snapshots that may wait for the disk before the run does.
 const QUEUE: usize = 8;
 
-/// Snapshots without a frame are handed over together until they span so many steps: waking the thread costs more than the
-/// metrics of a step.
+/// Snapshots are handed over together until they span so many steps, or their frames hold so many bytes: waking the thread costs
+/// more than the metrics of a step.
 const TOGETHER: u64 = 64;
+const TOGETHER_BYTES: usize = 1 << 19;
 
 /// A recording in the making: takes snapshots, encodes and writes them on a thread of its own.
 ///
@@ -25,8 +27,9 @@ const TOGETHER: u64 = 64;
 pub struct Writer {
     queue: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<Result<Written, Failure>>>,
-    /// Snapshots not yet handed over.
+    /// Snapshots not yet handed over, and the bytes of their frames.
     held: Vec<Arc<Snapshot>>,
+    held_bytes: usize,
     path: String,
 }
 
@@ -125,11 +128,12 @@ impl Writer {
             queue: Some(queue),
             thread: Some(thread),
             held: Vec::new(),
+            held_bytes: 0,
             path: name,
         })
     }
 
-    /// Hands a snapshot to the thread, those without a frame some at a time; waits while the queue is full.
+    /// Hands a snapshot to the thread, small ones some at a time; waits while the queue is full.
     ///
     /// # Errors
     ///
@@ -139,7 +143,9 @@ impl Writer {
     pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
         let snapshot = snapshot.into();
         let first = self.held.first().map_or(snapshot.step, |held| held.step);
-        let waits = snapshot.frame.is_none() && snapshot.step.saturating_sub(first) < TOGETHER;
+        self.held_bytes += snapshot.frame.as_ref().map_or(0, Frame::bytes);
+        let waits =
+            self.held_bytes < TOGETHER_BYTES && snapshot.step.saturating_sub(first) < TOGETHER;
         self.held.push(snapshot);
         if waits {
             return Ok(());
@@ -149,6 +155,7 @@ impl Writer {
 
     fn hand_over(&mut self) -> Result<(), RecordError> {
         let held = core::mem::take(&mut self.held);
+        self.held_bytes = 0;
         self.post(Message::Snapshots(held))
     }
 

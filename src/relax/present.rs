@@ -18,13 +18,13 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn frame(&self) -> Frame {
-        let contacts = self.law.contacts();
+        let (contacts, forces) = self.law.pairs_and_forces();
         Frame {
             step: self.step,
             positions: self.packing.positions().to_vec(),
             velocities: self.velocities.clone(),
-            contacts: contacts.pairs.to_vec(),
-            forces: contacts.forces.to_vec(),
+            contacts,
+            forces,
             minimizer: self.state,
         }
     }
