@@ -262,7 +262,7 @@ fn size(table: &Table) -> String {
             Line::Solid,
         ),
         series(
-            "– with two threads",
+            "– φ = 0.86, two threads",
             of("0.86", "two_threads_ns_per_step_and_particle"),
             BLUE,
             Marker::Circle,

@@ -24,7 +24,7 @@
 use super::error::ContactError;
 use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
-use super::search::Scene;
+use super::search::At;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::packing::Packing;
@@ -333,7 +333,7 @@ impl ContactLaw {
             }
         }
         self.work.distances += (self.others.len() + self.at_rest.len()) as u64;
-        let at = Scene {
+        let at = At {
             packing,
             line_tension: self.line_tension,
             geometry: &self.geometry,

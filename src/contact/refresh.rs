@@ -264,7 +264,7 @@ impl Layout<'_> {
     #[inline(always)]
     fn fill(
         self,
-        (known, forces): (Directions<'_>, &[f64]),
+        (directions, forces): (Directions<'_>, &[f64]),
         runs: Range<usize>,
         out: &mut Filled<'_>,
         products: &mut [f64],
@@ -277,7 +277,7 @@ impl Layout<'_> {
                 toward.resize(ends.len(), Direction::of(Vec2::x()));
             }
             for (toward, end) in toward.iter_mut().zip(ends) {
-                *toward = known.toward(*end);
+                *toward = directions.toward(*end);
             }
             let own = run.values().start - out.first..run.values().end - out.first;
             if values.len() < own.len() {

@@ -18,7 +18,7 @@ const TOGETHER: usize = 64;
 
 /// Where and under which forces pairs are looked at.
 #[derive(Clone, Copy)]
-pub(super) struct Scene<'a> {
+pub(super) struct At<'a> {
     pub(super) packing: &'a Packing,
     pub(super) line_tension: f64,
     pub(super) geometry: &'a Geometry,
@@ -49,7 +49,7 @@ pub(super) struct Search {
 
 impl Search {
     /// Looks at `pairs`, none of which is in contact.
-    pub(super) fn look_at(&mut self, at: Scene<'_>, pairs: impl Iterator<Item = [u32; 2]>) {
+    pub(super) fn look_at(&mut self, at: At<'_>, pairs: impl Iterator<Item = [u32; 2]>) {
         self.found.clear();
         (self.worst, self.tolerated) = (0.0, 0.0);
         self.near.clear();
@@ -89,7 +89,7 @@ impl Search {
     }
 
     /// Reads the forces on the particles of `pairs`.
-    fn load(&mut self, at: Scene<'_>, pairs: &[[u32; 2]]) {
+    fn load(&mut self, at: At<'_>, pairs: &[[u32; 2]]) {
         let duplicate = at.geometry.duplicate();
         let rows = |pair: &[u32; 2]| pair.map(|p| duplicate.entries(p as usize));
         self.rows.clear();

@@ -135,7 +135,7 @@ assert "live view" in done.stdout, done.stdout + done.stderr
 time.sleep(1)
 stop(receiver, signal.SIGINT)
 sent, received = rows("run.rrd"), rows("received.rrd")
-assert len(sent) > 20_000 and sent.keys() == received.keys(), f"{len(sent)} cells, {len(received)} received"
+assert len(sent) > 10_000 and sent.keys() == received.keys(), f"{len(sent)} cells, {len(received)} received"
 assert sent == received, [k for k in sent if sent[k] != received[k]][:5]
 print(f"received: all {len(received)} cells of {len({k[0] for k in received})} entities, bit for bit")
 
