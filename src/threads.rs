@@ -118,13 +118,16 @@ impl Drop for End<'_> {
     }
 }
 
-/// Whether this thread has a second one at hand.
+/// Contacts below which the loops are too short for a second thread.
+const FEWEST: usize = 16_384;
+
+/// Whether this thread has a second one at hand, and loops over so many `contacts` are worth sharing with it.
 #[inline]
-pub(crate) fn are_two() -> bool {
-    PAIRED.get()
+pub(crate) fn are_two_for(contacts: usize) -> bool {
+    contacts >= FEWEST && PAIRED.get()
 }
 
-/// Does one thing and the other: at the same time if `two`, which says that there [are](are_two).
+/// Does one thing and the other: at the same time if `two`, which says that there [are](are_two_for).
 #[inline]
 pub(crate) fn both(two: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     if two {

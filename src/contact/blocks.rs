@@ -113,11 +113,11 @@ impl ContactMatrix {
         self.scaled.resize(value, 0.0);
     }
 
-    /// Adds one more contact, with the next number: `geometry` has it already. Its particles' blocks move to the end.
+    /// Adds one more contact, with the next number: `duplicate` has it already. Its particles' blocks move to the end.
     pub(crate) fn add(
         &mut self,
         packing: &Packing,
-        geometry: &Geometry,
+        duplicate: &DuplicateContactList,
         pair: [u32; 2],
         line_tension: f64,
     ) {
@@ -132,7 +132,7 @@ impl ContactMatrix {
         for p in pair {
             self.remove_block(p);
             let run = Run {
-                size: geometry.duplicate().entries(p as usize).len(),
+                size: duplicate.entries(p as usize).len(),
                 count: 1,
                 block: self.particle.len(),
                 end: self.end.len(),
@@ -140,7 +140,6 @@ impl ContactMatrix {
             };
             self.block_of[p as usize] = run.block as u32;
             self.particle.push(p);
-            let duplicate = geometry.duplicate();
             let row = duplicate.entries(p as usize);
             self.end.extend(duplicate.ends(p, row));
             self.value.resize(run.values().end, 0.0);

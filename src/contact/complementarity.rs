@@ -120,26 +120,23 @@ impl ContactLaw {
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
-        if !multiplied {
+        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
+        let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
+        self.matrix.keeps_values = direct || !loosely;
+        if direct || !multiplied {
             self.matrix.complete(&self.geometry);
         }
-        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
-        self.matrix.keeps_values = !loosely;
-        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            self.matrix.keeps_values = true;
-            self.matrix.complete(&self.geometry);
-            let overlaps = self.geometry.overlaps();
-            let solver = &mut self.solver;
-            return solver.solve(&self.matrix, overlaps, &mut self.forces, tolerance);
-        };
         let (overlaps, forces) = (self.geometry.overlaps(), &mut self.forces[..]);
+        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
+            return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
+        };
         let goal = (tolerance, loosely);
-        let products = multiplied.then_some(self.products.sums());
-        let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, products)?;
+        let from = (multiplied.then_some(self.products.sums()), 0);
+        let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
         if let Progress::NeedsValues(iterations) = progress {
             self.matrix.complete(&self.geometry);
             let from = (None, iterations);
-            progress = solver.go_on(&self.matrix, overlaps, forces, goal, from)?;
+            progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
         }
         let iterations = match progress {
             Progress::Done(iterations) => return Ok(iterations),
@@ -339,6 +336,7 @@ impl ContactLaw {
             geometry: &self.geometry,
             forces: &self.forces,
             bulges: &self.bulges,
+            per_radius: self.per_radius(),
             tolerance,
         };
         let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
@@ -399,8 +397,8 @@ impl ContactLaw {
             self.forces.push(guess);
             self.added.push(pair);
             self.geometry.add(packing, pair);
-            self.matrix
-                .add(packing, &self.geometry, pair, self.line_tension);
+            let duplicate = self.geometry.duplicate();
+            self.matrix.add(packing, duplicate, pair, self.line_tension);
         }
         if self.is_in_order() {
             self.matrix.make_whole();

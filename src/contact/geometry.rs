@@ -245,8 +245,10 @@ impl Geometry {
     /// The contacts of particle `p` with their partners and directions, in the order of the partners.
     pub(crate) fn around(&self, p: usize) -> impl Iterator<Item = (u32, u32, Direction)> + '_ {
         let partners = self.duplicate.partners(p).iter();
-        let contacts = partners.zip(self.duplicate.contacts(p));
-        contacts.map(move |(&q, &c)| (q, c, self.toward(2 * c + u32::from((q as usize) < p))))
+        let ends = self.duplicate.ends(p as u32, self.duplicate.entries(p));
+        partners
+            .zip(ends)
+            .map(|(&q, end)| (q, end >> 1, self.toward(end)))
     }
 
     /// The gap between the deformed contours of particles `i < j` that are not in contact (length):

@@ -36,7 +36,7 @@ mod mend;
 mod patch;
 mod present;
 pub(crate) mod product;
-pub(crate) mod refresh;
+mod refresh;
 mod search;
 pub mod solver;
 mod tolerance;

@@ -8,12 +8,9 @@ use super::product::{Number, Products};
 use crate::domain::Vec2;
 use crate::droplet::kernel::Direction;
 use crate::packing::Packing;
-use crate::threads::{are_two, both};
+use crate::threads::{are_two_for, both};
 use crate::wide::wide;
 use core::ops::Range;
-
-/// Contacts below which the loops are too short for a second thread.
-pub(crate) const FEWEST_FOR_TWO: usize = 16_384;
 
 /// Room for what is computed of a run and not kept.
 #[derive(Clone, Debug, Default)]
@@ -32,14 +29,13 @@ struct Layout<'a> {
     scaling: &'a [f64],
 }
 
-/// Where the entries of blocks go, the first of all being number `first` of the matrix. The values themselves go nowhere unless
-/// they are to be kept.
+/// Where the entries of blocks go, the first of all being number `first` of the matrix; the values themselves only where they are
+/// to be kept.
 struct Filled<'a> {
     first: usize,
-    value: &'a mut [f64],
+    value: Option<&'a mut [f64]>,
     scaled: &'a mut [f32],
     room: &'a mut Room,
-    keep: bool,
 }
 
 impl ContactMatrix {
@@ -107,7 +103,7 @@ impl ContactMatrix {
 
     /// Whether there are two threads, and work for both.
     pub(super) fn is_for_two(&self) -> bool {
-        are_two() && self.len() >= FEWEST_FOR_TWO
+        are_two_for(self.len())
     }
 
     /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
@@ -207,22 +203,19 @@ impl ContactMatrix {
             scaling: &self.scaling,
         };
         let (scaled, more_scaled) = self.scaled.split_at_mut(first);
-        let kept = if keep { &mut self.value[..] } else { &mut [] };
-        let (value, more_values) = kept.split_at_mut(if keep { first } else { 0 });
+        let (value, more_values) = keep.then(|| self.value.split_at_mut(first)).unzip();
         let [room, more_room] = &mut self.rooms;
         let one = Filled {
             first: 0,
             value,
             scaled,
             room,
-            keep,
         };
         let other = Filled {
             first,
             value: more_values,
             scaled: more_scaled,
             room: more_room,
-            keep,
         };
         (layout, [one, other])
     }
@@ -286,10 +279,9 @@ impl Layout<'_> {
             let blocks = Blocks {
                 toward,
                 ends,
-                values: if out.keep {
-                    &mut out.value[own.clone()]
-                } else {
-                    &mut values[..own.len()]
+                values: match &mut out.value {
+                    Some(value) => &mut value[own.clone()],
+                    None => &mut values[..own.len()],
                 },
                 scaled: &mut out.scaled[own],
                 scaling: self.scaling,

@@ -10,7 +10,6 @@ use super::complementarity::Offence;
 use super::geometry::{Geometry, gap_of};
 use crate::droplet::kernel::Direction;
 use crate::packing::Packing;
-use core::f64::consts::PI;
 use core::ops::Range;
 
 /// Pairs that are looked at together: few enough for what is read of them to stay in the fastest memory.
@@ -24,6 +23,8 @@ pub(super) struct At<'a> {
     pub(super) geometry: &'a Geometry,
     pub(super) forces: &'a [f64],
     pub(super) bulges: &'a Bulges,
+    /// `1/2πγ`.
+    pub(super) per_radius: f64,
     /// How negative a gap may be (length).
     pub(super) tolerance: f64,
 }
@@ -64,7 +65,6 @@ impl Search {
             }
             self.near.push(pair);
         }
-        let per_radius = 1.0 / (2.0 * PI * at.line_tension);
         let near = core::mem::take(&mut self.near);
         for pairs in near.chunks(TOGETHER) {
             self.load(at, pairs);
@@ -78,7 +78,7 @@ impl Search {
                 begin = end;
                 self.worst = self.worst.max(-gap);
                 if gap < -at.tolerance {
-                    let guess = -gap / compliance(per_radius, radii[i] + radii[j]);
+                    let guess = -gap / compliance(at.per_radius, radii[i] + radii[j]);
                     self.found.push(Offence::Add(pair, guess));
                 } else {
                     self.tolerated = self.tolerated.max(-gap);

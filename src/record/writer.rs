@@ -27,9 +27,8 @@ const TOGETHER_BYTES: usize = 1 << 19;
 pub struct Writer {
     queue: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<Result<Written, Failure>>>,
-    /// Snapshots not yet handed over, and the bytes of their frames.
+    /// Snapshots not yet handed over.
     held: Vec<Arc<Snapshot>>,
-    held_bytes: usize,
     path: String,
 }
 
@@ -128,7 +127,6 @@ impl Writer {
             queue: Some(queue),
             thread: Some(thread),
             held: Vec::new(),
-            held_bytes: 0,
             path: name,
         })
     }
@@ -143,10 +141,11 @@ impl Writer {
     pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
         let snapshot = snapshot.into();
         let first = self.held.first().map_or(snapshot.step, |held| held.step);
-        self.held_bytes += snapshot.frame.as_ref().map_or(0, Frame::bytes);
-        let waits =
-            self.held_bytes < TOGETHER_BYTES && snapshot.step.saturating_sub(first) < TOGETHER;
+        let spans = snapshot.step.saturating_sub(first);
         self.held.push(snapshot);
+        let frames = self.held.iter().filter_map(|held| held.frame.as_ref());
+        let bytes: usize = frames.map(Frame::bytes).sum();
+        let waits = bytes < TOGETHER_BYTES && spans < TOGETHER;
         if waits {
             return Ok(());
         }
@@ -155,7 +154,6 @@ impl Writer {
 
     fn hand_over(&mut self) -> Result<(), RecordError> {
         let held = core::mem::take(&mut self.held);
-        self.held_bytes = 0;
         self.post(Message::Snapshots(held))
     }
 

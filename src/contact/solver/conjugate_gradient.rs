@@ -67,7 +67,7 @@ impl ConjugateGradient {
         tolerance: f64,
         loosely: bool,
     ) -> Result<usize, SolverError> {
-        match self.begin(matrix, overlaps, forces, (tolerance, loosely), None)? {
+        match self.begin(matrix, overlaps, forces, (tolerance, loosely), (None, 0))? {
             Progress::Done(iterations) => Ok(iterations),
             Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => {
                 self.finish(matrix, overlaps, forces, tolerance, iterations)
@@ -78,28 +78,8 @@ impl ConjugateGradient {
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
     /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
     /// above round-off: that saves a product with the matrix. So do `products`, those of its off-diagonal entries with the
-    /// `forces`, where they are at hand.
+    /// `forces`, where they are at hand. What [needs values](Progress::NeedsValues) goes on here with the `iterations` it had.
     pub(crate) fn begin(
-        &mut self,
-        matrix: &ContactMatrix,
-        overlaps: &[f64],
-        forces: &mut [f64],
-        (tolerance, loosely): (f64, bool),
-        products: Option<&[f64]>,
-    ) -> Result<Progress, SolverError> {
-        self.prepare(matrix);
-        self.single.prepare(matrix.len());
-        self.go_on(
-            matrix,
-            overlaps,
-            forces,
-            (tolerance, loosely),
-            (products, 0),
-        )
-    }
-
-    /// [`begin`](Self::begin), or what comes after so many iterations.
-    pub(crate) fn go_on(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
@@ -107,6 +87,8 @@ impl ConjugateGradient {
         (tolerance, loosely): (f64, bool),
         (mut products, mut iterations): (Option<&[f64]>, usize),
     ) -> Result<Progress, SolverError> {
+        self.prepare(matrix);
+        self.single.prepare(matrix.len());
         loop {
             let before = self.largest;
             self.largest = match products.take() {

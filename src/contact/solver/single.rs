@@ -16,8 +16,7 @@
 
 use crate::contact::matrix::ContactMatrix;
 use crate::contact::product::Products;
-use crate::contact::refresh::FEWEST_FOR_TWO;
-use crate::threads::{are_two, both};
+use crate::threads::{are_two_for, both};
 use crate::wide::wide;
 
 /// How far one round lowers the residual at most.
@@ -141,7 +140,7 @@ impl Single {
 
 /// Where a column of so many numbers is cut for two threads; at its end if it is too short for both.
 fn half(length: usize) -> usize {
-    if are_two() && length >= FEWEST_FOR_TWO {
+    if are_two_for(length) {
         (length / 2).next_multiple_of(STRETCH).min(length)
     } else {
         length
