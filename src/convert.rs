@@ -25,12 +25,14 @@
 //! ```
 
 use crate::domain::Vec2;
-use crate::force::{Backbone, METRICS, Metrics};
+use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
-use crate::record::{Header, Outcome, RecordError, Snapshot, Writer, Written, nanoseconds};
+use crate::record::{
+    Header, Outcome, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
+};
 use crate::relax::{RelaxError, Relaxation};
 use crate::replay::{Event, ReadError, Recording};
-use crate::scene::{Channels, Scene, Schedule};
+use crate::scene::{Channels, Scene, SceneError, Schedule};
 use std::collections::BTreeMap;
 
 /// What a conversion came to.
@@ -65,6 +67,9 @@ pub enum ConvertError {
     /// The run could not be walked again.
     #[error(transparent)]
     Run(#[from] RelaxError),
+    /// The channels are out of range.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The channels ask for what only a state can give.
     #[error(
         "{path} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
@@ -92,7 +97,8 @@ pub enum ConvertError {
 ///
 /// # Errors
 ///
-/// [`ConvertError::NoState`] if the recording does not hold what the channels need.
+/// [`ConvertError::NoState`] if the recording does not hold what the channels need, [`ConvertError::Scene`] if they are out of
+/// range.
 ///
 /// See the example of the [module](self).
 pub fn header(recording: &Recording, channels: Channels) -> Result<Header, ConvertError> {
@@ -102,11 +108,13 @@ pub fn header(recording: &Recording, channels: Channels) -> Result<Header, Conve
         positions: vec![Vec2::zeros(); recording.radii().len()],
         ..Frame::default()
     };
+    let scene = Scene {
+        channels,
+        ..recording.scene().clone()
+    };
+    scene.validate()?;
     Ok(Header {
-        scene: Scene {
-            channels,
-            ..recording.scene().clone()
-        },
+        scene,
         packing: recording.packing(&anywhere)?,
         from_step: recording.from_step(),
     })
@@ -237,6 +245,7 @@ impl Conversion {
             contacts,
             metrics,
             state,
+            ..
         } = self.channels;
         let asks = |schedule: Schedule| {
             let first = behind.checked_sub(1).and_then(|step| schedule.after(step));
@@ -263,14 +272,14 @@ impl Conversion {
         let start = from.step;
         let packing = recording.packing(&from)?;
         let mut run = Relaxation::resume(recording.scene(), packing, from)?;
-        let mut backbone = Backbone::default();
+        let mut snapshots = Snapshots::default();
         loop {
             run.advance()?;
             if run.step() == to.step {
                 break;
             }
             self.rebuilt += 1;
-            if let Some(snapshot) = Snapshot::counted(&run, &self.channels, false, &mut backbone) {
+            if let Some(snapshot) = snapshots.take(&run, &self.channels, false) {
                 self.writer.send(snapshot)?;
             }
         }
@@ -315,6 +324,7 @@ impl Conversion {
                 contours,
                 contacts,
                 state,
+                edge,
             })?;
         }
         Ok(())
@@ -332,6 +342,7 @@ impl Conversion {
                 contours: false,
                 contacts: false,
                 state: false,
+                edge: false,
             })?;
         }
         Ok(())
@@ -351,6 +362,7 @@ impl Conversion {
                 contours: false,
                 contacts: false,
                 state: false,
+                edge: false,
             })?;
         }
         Ok(())

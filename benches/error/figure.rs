@@ -290,16 +290,17 @@ fn size(table: &Table) -> String {
 
 fn recording(table: &Table) -> String {
     let bars: Vec<(String, f64, String)> = [
-        ("none", "none"),
-        ("metrics", "metrics"),
-        ("state", "state"),
-        ("contacts", "contacts"),
-        ("contours", "contours"),
-        ("all", "contours contacts metrics state"),
+        ("none", "none", ""),
+        ("metrics", "metrics", "0.01"),
+        ("state", "state", "0.01"),
+        ("contacts", "contacts", "0.01"),
+        ("contours", "contours", "0.01"),
+        ("all", "contours contacts metrics state", "0.01"),
+        ("– redraw 0", "contours contacts metrics state", "0"),
     ]
     .into_iter()
-    .filter_map(|(name, channels)| {
-        let filter = [("channels", channels)];
+    .filter_map(|(name, channels, redraw)| {
+        let filter = [("channels", channels), ("redraw", redraw)];
         let slow = table.points(&filter, "slowdown", "bytes_per_step");
         let rate = table.points(&filter, "steps_per_s", "bytes_per_step");
         let (&(slow, bytes), &(rate, _)) = (slow.first()?, rate.first()?);
@@ -317,7 +318,7 @@ fn recording(table: &Table) -> String {
         .unwrap_or_default();
     Bars {
         title: format!("e  Recording every step, N = {n}"),
-        label: "time of a step / without recording (steps/s, size)".into(),
+        label: "time of a run / without recording (steps/s, size of a step)".into(),
         most: bars
             .iter()
             .fold(1.5, |m: f64, b| m.max((2.0 * b.1).ceil() / 2.0)),

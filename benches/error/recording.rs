@@ -1,36 +1,41 @@
-//! (e) What recording costs: time a step and bytes a step, with each channel off and on.
+//! (e) What recording costs: whole runs to the scene's threshold with each channel off and on, at every step.
 //!
-//! Runs the program itself, `softjam record`, for two numbers of steps in turn: what the longer run takes beyond the shorter
-//! is the cost of its steps, the rest is fixed: the file opened, begun, ended and brought to the disk. Without a channel
-//! nothing is recorded but the metrics of the first and the last step. The run of seed 1 at N = 1024 takes 3070 steps to `f_max` of
-//! 1e-10. The program is `target/release/softjam`, or what `SOFTJAM` names; files go to the folder for temporary files.
+//! Runs the program itself, `softjam record`, and compares each run with one of the same seed right before it that records nothing
+//! but the metrics of the first and the last step. The time is that from the first step until the file is closed. Pictures
+//! are drawn where they would look different (`redraw`), so what a run costs depends on how long it rearranges: medians over
+//! seeds. The program is `target/release/softjam`, or what `SOFTJAM` names; files go to the folder for temporary files.
 
 use super::table::{Table, digits, median};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const CHANNELS: [&str; 9] = [
-    "contours,contacts,metrics,state",
-    "contacts,metrics,state",
-    "contours,metrics,state",
-    "contours,contacts,state",
-    "contours,contacts,metrics",
-    "metrics",
-    "state",
-    "contours",
-    "contacts",
+/// Channels at every step, or the scene's own schedules, and whether every picture is drawn.
+const CASES: [(&str, bool); 11] = [
+    ("contours contacts metrics state", false),
+    ("contours contacts metrics state", true),
+    ("contacts metrics state", false),
+    ("contours metrics state", false),
+    ("contours contacts state", false),
+    ("contours contacts metrics", false),
+    ("metrics", false),
+    ("state", false),
+    ("contours", false),
+    ("contacts", false),
+    ("as in the default scene", false),
 ];
 
 pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(&[
         "particles",
         "channels",
+        "redraw",
+        "runs",
         "steps",
         "steps_per_s",
         "slowdown",
-        "fixed_ms",
-        "slowdown_of_the_run",
+        "least_slowdown",
+        "largest_slowdown",
         "bytes_per_step",
     ]);
     let program = std::env::var_os("SOFTJAM")
@@ -42,96 +47,92 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
         );
         return Ok(table);
     }
-    let (particles, few, steps, rounds) = if quick {
-        (64, 10, 50, 1)
-    } else {
-        (1024, 400, 2000, 15)
-    };
-    let run = |steps: u64, channels: &str| record(&program, particles, steps, channels);
-    let mut measured: Vec<Vec<Times>> = vec![Vec::new(); CHANNELS.len()];
+    let (particles, seeds, rounds) = if quick { (64, 1, 1) } else { (1024, 5, 3) };
+    let mut measured: Vec<Vec<[Run; 2]>> = vec![Vec::new(); CASES.len()];
     for round in 0..rounds {
-        for (list, channels) in measured.iter_mut().zip(CHANNELS) {
-            // What costs a few per cent takes more rounds to see than what costs as much as the run.
-            if round >= 3 && channels.contains("cont") {
-                continue;
+        for seed in 1..=seeds {
+            for (list, (channels, all)) in measured.iter_mut().zip(CASES) {
+                // What costs a few per cent takes more runs to see than what costs half of the run.
+                if round > 0 && channels.contains("cont") {
+                    continue;
+                }
+                let bare = record(&program, particles, seed, "none", false)?;
+                list.push([bare, record(&program, particles, seed, channels, all)?]);
             }
-            // What is compared is measured right before.
-            let bare = (run(few, "none")?.0, run(steps, "none")?.0);
-            let (short, less) = run(few, channels)?;
-            let (long, bytes) = run(steps, channels)?;
-            list.push(Times {
-                bare,
-                recorded: (short, long),
-                bytes: (bytes - less) / (steps - few) as f64,
-            });
         }
     }
-    let more = (steps - few) as f64;
-    let of = |list: &[Times], f: &dyn Fn(&Times) -> f64| median(list.iter().map(f).collect());
-    let a_step = |(short, long): (f64, f64)| (long - short) / more;
-    let mut row = |channels: &str, list: &[Times], pick: fn(&Times) -> (f64, f64), bytes: f64| {
-        let each = of(list, &|t| a_step(pick(t)));
-        let slowdown = of(list, &|t| a_step(pick(t)) / a_step(t.bare));
-        let fixed = of(list, &|t| pick(t).1 - steps as f64 * a_step(pick(t)));
-        let whole = of(list, &|t| pick(t).1 / t.bare.1);
+    let mut row = |channels: &str, redraw: &str, runs: &[[Run; 2]], of: usize| {
+        let each = |f: &dyn Fn(&Run) -> f64| median(runs.iter().map(|r| f(&r[of])).collect());
+        let slowdown = || runs.iter().map(|r| r[of].seconds / r[0].seconds);
         table.push(vec![
             particles.to_string(),
-            channels.replace(',', " "),
-            steps.to_string(),
-            format!("{:.0}", 1.0 / each),
-            format!("{slowdown:.3}"),
-            format!("{:.1}", 1e3 * fixed),
-            format!("{whole:.3}"),
-            digits(bytes),
+            channels.to_owned(),
+            redraw.to_owned(),
+            runs.len().to_string(),
+            format!("{:.0}", each(&|r| r.steps)),
+            format!("{:.0}", each(&|r| r.steps / r.seconds)),
+            format!("{:.3}", median(slowdown().collect())),
+            format!("{:.3}", slowdown().fold(f64::INFINITY, f64::min)),
+            format!("{:.3}", slowdown().fold(0.0, f64::max)),
+            digits(each(&|r| r.bytes / r.steps)),
         ]);
     };
-    row("none", &measured.concat(), |t| t.bare, 0.0);
-    for (list, channels) in measured.iter().zip(CHANNELS) {
-        row(channels, list, |t| t.recorded, list[0].bytes);
+    row("none", "", &measured.concat(), 0);
+    for (runs, (channels, all)) in measured.iter().zip(CASES) {
+        row(channels, if all { "0" } else { "0.01" }, runs, 1);
     }
     Ok(table)
 }
 
-/// What a run of few steps and one of many take (s), without and with a channel, and the bytes of a step.
+/// What a run took and left behind.
 #[derive(Clone, Copy)]
-struct Times {
-    bare: (f64, f64),
-    recorded: (f64, f64),
+struct Run {
+    steps: f64,
+    seconds: f64,
     bytes: f64,
 }
 
-/// The time of a run (s), from its first step until its file is closed, and the bytes of the file.
 fn record(
     program: &Path,
     particles: usize,
-    steps: u64,
+    seed: u64,
     channels: &str,
-) -> Result<(f64, f64), Box<dyn Error>> {
+    every_picture: bool,
+) -> Result<Run, Box<dyn Error>> {
     let file = std::env::temp_dir().join(format!("softjam-benchmark-{}.rrd", std::process::id()));
-    let every: Vec<String> = match channels {
-        "none" => vec![format!("metrics=every:{}", u32::MAX)],
-        some => some.split(',').map(|c| format!("{c}=every:1")).collect(),
+    let every = match channels {
+        "none" => format!("metrics=every:{}", u32::MAX),
+        some => {
+            let each: Vec<_> = some.split(' ').map(|c| format!("{c}=every:1")).collect();
+            each.join(",")
+        }
     };
-    let output = Command::new(program)
-        .args(["record", "--force", "--threshold", "1e-300"])
-        .args([
-            "--particles",
-            &particles.to_string(),
-            "--steps",
-            &steps.to_string(),
-        ])
-        .args(["--channels", &every.join(",")])
-        .arg("--output")
-        .arg(&file)
-        .output()?;
+    let mut command = Command::new(program);
+    command.args(["record", "--force"]);
+    command.args(["--particles", &particles.to_string()]);
+    command.args(["--seed", &seed.to_string()]);
+    if !channels.starts_with("as in") {
+        command.args(["--channels", &every]);
+    }
+    if every_picture {
+        command.args(["--redraw", "0"]);
+    }
+    let output = command.arg("--output").arg(&file).output()?;
     let bytes = std::fs::metadata(&file)?.len() as f64;
     std::fs::remove_file(&file)?;
-    // `time   0.02 s disks, 0.53 s relaxation (3942 steps/s)`
+    // `result         converged in 2307 steps` and
+    // `time           0.02 s disks, 0.53 s relaxation (3942 steps/s)`
     let text = String::from_utf8(output.stdout)?;
-    let rate = text
-        .lines()
-        .find(|l| l.starts_with("time"))
-        .and_then(|l| l.rsplit_once('(')?.1.split(' ').next()?.parse::<f64>().ok())
-        .ok_or_else(|| format!("no rate in: {text}"))?;
-    Ok((steps as f64 / rate, bytes))
+    let line = |start: &str| text.lines().find(|line| line.starts_with(start));
+    let number = |word: Option<&str>| word?.parse::<f64>().ok();
+    let steps = line("result").and_then(|l| number(l.split(' ').rev().nth(1)));
+    let rate = line("time").and_then(|l| number(l.rsplit_once('(')?.1.split(' ').next()));
+    let (steps, rate) = steps
+        .zip(rate)
+        .ok_or_else(|| format!("no steps or no rate in: {text}"))?;
+    Ok(Run {
+        steps,
+        seconds: steps / rate,
+        bytes,
+    })
 }

@@ -92,6 +92,11 @@ pub struct ChannelFlags {
     /// and keep theirs).
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = RECORDING)]
     every: Option<i64>,
+
+    /// Draw contours and contacts anew when a particle has moved by more than this (mean radii), or a pressure or force has
+    /// changed by more than five times this (means); 0 draws them whenever they are scheduled [default: 0.01].
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = real, help_heading = RECORDING)]
+    redraw: Option<f64>,
 }
 
 const PACKING: &str = "Packing";
@@ -166,6 +171,7 @@ impl ChannelFlags {
                 contacts: Schedule::Off,
                 metrics: Schedule::Off,
                 state: Schedule::Off,
+                ..scheduled
             };
             for &(k, schedule) in list {
                 // A channel that the scene switches off and the flag names goes by its default.
@@ -192,7 +198,11 @@ impl ChannelFlags {
                 }
             }
         }
-        Ok((self.channels.is_some() || self.every.is_some()).then_some(channels))
+        if let Some(redraw) = self.redraw {
+            channels.redraw = redraw;
+        }
+        let changed = self.channels.is_some() || self.every.is_some() || self.redraw.is_some();
+        Ok(changed.then_some(channels))
     }
 }
 

@@ -154,7 +154,17 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         ),
     );
     for (channel, (count, first, last)) in &found.channels {
-        line(channel, format!("{count} steps, {first} … {last}"));
+        let pictures =
+            scene.channels.redraw > 0.0 && ["contours", "contacts"].contains(&&**channel);
+        let where_drawn = if pictures {
+            ", drawn where they look different"
+        } else {
+            ""
+        };
+        line(
+            channel,
+            format!("{count} steps, {first} … {last}{where_drawn}"),
+        );
     }
     if !found.channels.contains_key("state") {
         let none = if scene.channels.state.is_on() {

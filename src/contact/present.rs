@@ -7,6 +7,7 @@ use super::matrix::{ContactMatrix, Geometry};
 use super::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::force::net_forces;
+use core::ops::Range;
 use std::sync::OnceLock;
 
 impl ContactLaw {
@@ -24,17 +25,43 @@ impl ContactLaw {
         }
     }
 
-    /// Pairs and forces of [`contacts`](Self::contacts), copied.
-    pub(crate) fn pairs_and_forces(&self) -> (Vec<[u32; 2]>, Vec<f64>) {
-        if self.is_in_order() {
-            return (self.pairs.clone(), self.forces.clone());
+    /// Pairs and forces of [`contacts`](Self::contacts), copied to where others were.
+    pub(crate) fn copy_contacts(&self, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        pairs.clear();
+        forces.clear();
+        pairs.reserve(self.contact_count());
+        forces.reserve(self.contact_count());
+        for stretch in self.in_order() {
+            pairs.extend_from_slice(&self.pairs[stretch.clone()]);
+            forces.extend_from_slice(&self.forces[stretch]);
         }
-        let order = in_order(&self.pairs, &self.matrix);
-        let numbers = || order.iter().map(|c| *c as usize);
-        (
-            numbers().map(|c| self.pairs[c]).collect(),
-            numbers().map(|c| self.forces[c]).collect(),
-        )
+    }
+
+    /// The contacts that are not at rest in the order of pairs, as stretches of their numbers.
+    fn in_order(&self) -> Vec<Range<usize>> {
+        let sorted = self.pairs.len() - self.added.len();
+        let (mut gone, mut late) = (self.at_rest.clone(), Vec::new());
+        gone.sort_unstable();
+        // Before which of the sorted ones a later one belongs.
+        for c in sorted..self.pairs.len() {
+            if gone.binary_search(&(c as u32)).is_err() {
+                let before = self.pairs[..sorted].partition_point(|pair| *pair < self.pairs[c]);
+                late.push((before, self.pairs[c], c));
+            }
+        }
+        late.sort_unstable();
+        let (mut stretches, mut from) = (Vec::new(), 0);
+        let mut late = late.into_iter().peekable();
+        let ends = gone.into_iter().map(|c| c as usize);
+        for end in ends.take_while(|c| *c < sorted).chain([sorted]) {
+            while let Some((before, _, c)) = late.next_if(|(before, ..)| *before <= end) {
+                stretches.extend([from..before, c..c + 1]);
+                from = before;
+            }
+            stretches.push(from..end);
+            from = end + 1;
+        }
+        stretches
     }
 
     /// The contacts in the order of their numbers, those at rest among them with no force.
@@ -109,7 +136,7 @@ impl ContactLaw {
 
     pub(super) fn present(&self) -> &Present {
         self.present
-            .get_or_init(|| Present::of(&self.numbered(), &self.matrix))
+            .get_or_init(|| Present::of(&self.numbered(), &self.in_order(), &self.matrix))
     }
 }
 
@@ -124,21 +151,19 @@ pub(super) struct Present {
 }
 
 impl Present {
-    /// Those of `numbered`, the contacts of `matrix`.
-    pub(super) fn of(numbered: &Contacts<'_>, matrix: &ContactMatrix) -> Self {
-        let order = in_order(numbered.pairs, matrix);
-        let pick = |c: &u32| *c as usize;
-        let contacts = FrameContacts {
-            pairs: order.iter().map(|c| numbered.pairs[pick(c)]).collect(),
-            normals: order.iter().map(|c| numbered.normals[pick(c)]).collect(),
-            distances: order.iter().map(|c| numbered.distances[pick(c)]).collect(),
-            overlaps: order.iter().map(|c| numbered.overlaps[pick(c)]).collect(),
-            forces: order.iter().map(|c| numbered.forces[pick(c)]).collect(),
-        };
+    /// Those `stretches` of `numbered`, the contacts of `matrix`.
+    fn of(numbered: &Contacts<'_>, stretches: &[Range<usize>], matrix: &ContactMatrix) -> Self {
+        let order = stretches.iter().cloned().flatten();
         Self {
-            contacts,
+            contacts: FrameContacts {
+                pairs: picked(numbered.pairs, stretches),
+                normals: picked(numbered.normals, stretches),
+                distances: picked(numbered.distances, stretches),
+                overlaps: picked(numbered.overlaps, stretches),
+                forces: picked(numbered.forces, stretches),
+            },
             particles: matrix.particles(),
-            order,
+            order: order.map(|c| c as u32).collect(),
             matrix: OnceLock::new(),
         }
     }
@@ -158,22 +183,13 @@ impl Present {
     }
 }
 
-/// The numbers of the contacts that are not at rest, in the order of pairs.
-fn in_order(pairs: &[[u32; 2]], matrix: &ContactMatrix) -> Vec<u32> {
-    let at_work = |c: &u32| matrix.scaling()[*c as usize] > 0.0;
-    let (sorted, all) = (matrix.sorted_contacts() as u32, pairs.len() as u32);
-    let mut late: Vec<u32> = (sorted..all).filter(at_work).collect();
-    late.sort_unstable_by_key(|c| pairs[*c as usize]);
-    let mut late = late.into_iter().peekable();
-    let mut order = Vec::with_capacity(pairs.len());
-    for c in (0..sorted).filter(at_work) {
-        while let Some(k) = late.next_if(|k| pairs[*k as usize] < pairs[c as usize]) {
-            order.push(k);
-        }
-        order.push(c);
+/// Stretches of `values`, one after the other.
+fn picked<T: Copy>(values: &[T], stretches: &[Range<usize>]) -> Vec<T> {
+    let mut picked = Vec::with_capacity(values.len());
+    for stretch in stretches {
+        picked.extend_from_slice(&values[stretch.clone()]);
     }
-    order.extend(late);
-    order
+    picked
 }
 
 /// The name of a set of contacts; see [`ContactLaw::sets`].

@@ -23,7 +23,7 @@ use crate::wide::wide;
 /// ```
 #[must_use]
 pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
-    let (numbers, contacts) = held_contacts(particles, pairs);
+    let (numbers, contacts) = held_contacts(numbers(particles, pairs), pairs);
     (numbers.iter().filter(|n| **n < 3).count(), contacts)
 }
 
@@ -41,7 +41,7 @@ pub fn backbone(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
 /// ```
 #[must_use]
 pub fn held(particles: usize, pairs: &[[u32; 2]]) -> Vec<bool> {
-    let (numbers, _) = held_contacts(particles, pairs);
+    let (numbers, _) = held_contacts(numbers(particles, pairs), pairs);
     numbers.iter().map(|n| *n >= 3).collect()
 }
 
@@ -103,15 +103,45 @@ impl Backbone {
         contacts: &Contacts<'_>,
         touching: usize,
     ) -> (usize, usize) {
-        self.set = None;
-        if touching == contacts.pairs.len() {
-            self.follow(particles, contacts.pairs);
-        } else {
-            let pairs = contacts.pairs.iter().zip(contacts.forces);
-            let pairs = pairs.filter(|(_, f)| **f > 0.0).map(|(p, _)| *p);
-            self.follow(particles, &pairs.collect::<Vec<_>>());
-        }
+        self.count_bearing(particles, (contacts.pairs, contacts.forces), touching);
         (self.rattlers, self.contacts)
+    }
+
+    /// Goes on to pairs with these forces, of which `touching` are above 0.
+    fn count_bearing(
+        &mut self,
+        particles: usize,
+        (pairs, forces): (&[[u32; 2]], &[f64]),
+        touching: usize,
+    ) {
+        self.set = None;
+        if touching == pairs.len() {
+            self.follow(particles, pairs);
+        } else {
+            let bearing = pairs.iter().zip(forces).filter(|(_, f)| **f > 0.0);
+            let bearing: Vec<_> = bearing.map(|(pair, _)| *pair).collect();
+            self.follow(particles, &bearing);
+        }
+    }
+
+    /// Which of `particles` are held by contacts between `pairs` that bear `forces`; goes on from the frame before, as
+    /// [`count`](Self::count) does.
+    ///
+    /// # Panics
+    ///
+    /// If a pair names a particle that is not there.
+    ///
+    /// ```
+    /// use softjam::force::Backbone;
+    ///
+    /// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
+    /// let held = Backbone::default().held(5, &pairs, &[1.0; 8]);
+    /// assert_eq!(held, [true, true, true, true, false]);
+    /// ```
+    pub fn held(&mut self, particles: usize, pairs: &[[u32; 2]], forces: &[f64]) -> Vec<bool> {
+        let touching = forces.iter().filter(|f| **f > 0.0).count();
+        self.count_bearing(particles, (pairs, forces), touching);
+        self.held.iter().map(|n| *n >= 3).collect()
     }
 
     /// [`count`](Self::count) of the contacts of `law`, of which `touching` bear a force. Behind each of its solutions it is
@@ -141,7 +171,7 @@ impl Backbone {
                 self.room.clear();
                 self.room.extend(bearing);
                 let pairs = core::mem::take(&mut self.room);
-                self.count_anew(particles, &pairs);
+                self.count_anew(&pairs);
                 self.room = pairs;
             }
             self.pairs = None;
@@ -170,7 +200,8 @@ impl Backbone {
                 return;
             }
         }
-        self.count_anew(particles, pairs);
+        self.all = numbers(particles, pairs);
+        self.count_anew(pairs);
         self.pairs = Some(pairs.to_vec());
     }
 
@@ -205,14 +236,9 @@ impl Backbone {
         closed
     }
 
-    /// Counts the contacts `pairs`, in any order.
-    fn count_anew(&mut self, particles: usize, pairs: &[[u32; 2]]) {
-        self.all.clear();
-        self.all.resize(particles, 0);
-        for p in pairs.as_flattened() {
-            self.all[*p as usize] += 1;
-        }
-        (self.held, self.contacts) = held_contacts(particles, pairs);
+    /// Counts those of the contacts `pairs`, in any order, that are between particles that are held; `all` are counted.
+    fn count_anew(&mut self, pairs: &[[u32; 2]]) {
+        (self.held, self.contacts) = held_contacts(self.all.clone(), pairs);
         self.rattlers = self.held.iter().filter(|n| **n < 3).count();
         self.counts += 1;
         self.open.clear();
@@ -270,32 +296,38 @@ fn common(a: &[[u32; 2]], b: &[[u32; 2]]) -> usize {
     start + rest.take_while(|(a, b)| a == b).count()
 }
 
-/// The number of contacts of each particle with others that are held, and the number of contacts between such.
-fn held_contacts(particles: usize, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
-    let mut contacts = vec![0u32; particles];
-    for &[i, j] in pairs {
-        contacts[i as usize] += 1;
-        contacts[j as usize] += 1;
+/// The number of contacts of each particle.
+fn numbers(particles: usize, pairs: &[[u32; 2]]) -> Vec<u32> {
+    let mut numbers = vec![0; particles];
+    for p in pairs.as_flattened() {
+        numbers[*p as usize] += 1;
     }
-    // Takes a contact away unless both of its particles have three. Whoever loses its third has contacts that were passed.
-    let mut passed = false;
-    let mut stays = |&[i, j]: &[u32; 2], passed: &mut bool| {
-        let (i, j) = (i as usize, j as usize);
-        let held = contacts[i] >= 3 && contacts[j] >= 3;
-        if !held {
+    numbers
+}
+
+/// The number of contacts of each particle with others that are held, and the number of contacts between such; `contacts` are
+/// those of each particle in `pairs`.
+fn held_contacts(mut contacts: Vec<u32>, pairs: &[[u32; 2]]) -> (Vec<u32>, usize) {
+    let (mut taken, mut left) = (vec![false; pairs.len()], pairs.len());
+    loop {
+        // Whoever loses its third contact has contacts that were passed.
+        let mut passed = false;
+        for (&[i, j], taken) in pairs.iter().zip(&mut taken) {
+            let (i, j) = (i as usize, j as usize);
+            if contacts[i] >= 3 && contacts[j] >= 3 || *taken {
+                continue;
+            }
+            *taken = true;
+            left -= 1;
             for k in [i, j] {
-                *passed |= contacts[k] == 3;
+                passed |= contacts[k] == 3;
                 contacts[k] -= 1;
             }
         }
-        held
-    };
-    let all = pairs.iter().copied();
-    let mut left: Vec<[u32; 2]> = all.filter(|pair| stays(pair, &mut passed)).collect();
-    while core::mem::take(&mut passed) {
-        left.retain(|pair| stays(pair, &mut passed));
+        if !passed {
+            return (contacts, left);
+        }
     }
-    (contacts, left.len())
 }
 
 #[cfg(test)]

@@ -1,26 +1,27 @@
 //! Rows of values, one cell of `W` numbers for each instance of an entity.
 
 use super::columns::{Column, lists, offsets};
+use super::memory::Values;
 use rerun::ComponentDescriptor;
 use rerun::external::arrow::array::{
     Array as _, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, StringArray, UInt8Array,
     UInt32Array,
 };
-use rerun::external::arrow::buffer::Buffer;
-use rerun::external::arrow::datatypes::Field;
+use rerun::external::arrow::buffer::{Buffer, ScalarBuffer};
+use rerun::external::arrow::datatypes::{ArrowNativeType, Field};
 use std::io;
 use std::sync::Arc;
 
 /// A number that a cell holds.
-pub(super) trait Number: Copy {
-    fn array(values: Vec<Self>) -> ArrayRef;
+pub(super) trait Number: ArrowNativeType {
+    fn array(values: Buffer) -> ArrayRef;
 }
 
 macro_rules! numbers {
     ($($number:ty: $array:ty),*) => {$(
         impl Number for $number {
-            fn array(values: Vec<Self>) -> ArrayRef {
-                Arc::new(<$array>::from(values))
+            fn array(values: Buffer) -> ArrayRef {
+                Arc::new(<$array>::new(ScalarBuffer::from(values), None))
             }
         }
     )*};
@@ -29,17 +30,16 @@ macro_rules! numbers {
 numbers!(f32: Float32Array, f64: Float64Array, u32: UInt32Array, u8: UInt8Array);
 
 /// Cells in the making; their rows are those of the strips or points beside which they stand.
-#[derive(Clone)]
-pub(super) struct Cells<T, const W: usize> {
-    values: Vec<[T; W]>,
+pub(super) struct Cells<T: Number, const W: usize> {
+    values: Values<T, W>,
     /// Where the cells of each row end.
     rows: Vec<usize>,
 }
 
-impl<T, const W: usize> Default for Cells<T, W> {
+impl<T: Number, const W: usize> Default for Cells<T, W> {
     fn default() -> Self {
         Self {
-            values: Vec::new(),
+            values: Values::default(),
             rows: Vec::new(),
         }
     }
@@ -49,7 +49,7 @@ impl<T: Number, const W: usize> Cells<T, W> {
     /// Room for as much as `other` holds.
     pub fn with_room_of(other: &Self) -> Self {
         Self {
-            values: Vec::with_capacity(other.values.len() + other.values.len() / 8),
+            values: Values::with_room_of(&other.values),
             rows: Vec::with_capacity(other.rows.len()),
         }
     }
@@ -72,7 +72,7 @@ impl<T: Number, const W: usize> Cells<T, W> {
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let rows = offsets(&self.rows)?;
-        let mut values = T::array(self.values.into_flattened());
+        let mut values = T::array(self.values.into_buffer());
         if W > 1 {
             let item = Arc::new(Field::new("item", values.data_type().clone(), false));
             values = Arc::new(FixedSizeListArray::new(item, W as i32, values, None));
@@ -82,10 +82,10 @@ impl<T: Number, const W: usize> Cells<T, W> {
 }
 
 /// Rows of short texts, one for each instance.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Texts {
     /// ASCII.
-    text: Vec<u8>,
+    text: Values<u8, 1>,
     /// Where each text ends.
     ends: Vec<usize>,
     /// Where the texts of each row end.
@@ -96,7 +96,7 @@ impl Texts {
     /// Room for as much as `other` holds.
     pub fn with_room_of(other: &Self) -> Self {
         Self {
-            text: Vec::with_capacity(other.text.len() + other.text.len() / 8),
+            text: Values::with_room_of(&other.text),
             ends: Vec::with_capacity(other.ends.len()),
             rows: Vec::with_capacity(other.rows.len()),
         }
@@ -104,7 +104,7 @@ impl Texts {
 
     /// Adds to the text at hand.
     pub fn push(&mut self, text: &str) {
-        self.text.extend_from_slice(text.as_bytes());
+        self.extend(text.as_bytes());
     }
 
     /// Adds a count to the text at hand.
@@ -118,7 +118,11 @@ impl Texts {
                 break;
             }
         }
-        self.text.extend_from_slice(&digits[first..]);
+        self.extend(&digits[first..]);
+    }
+
+    fn extend(&mut self, ascii: &[u8]) {
+        self.text.extend_from_slice(ascii.as_chunks().0);
     }
 
     /// Adds a number to the text at hand, rounded to three digits: `0.0346`, `12.3`, `461`, `4.61e-8`. The general way to
@@ -138,20 +142,19 @@ impl Texts {
         }
         let m = (m + 0.5) as u32;
         let [a, b, c] = [digit(m / 100), digit(m / 10), digit(m)];
-        let text = &mut self.text;
         match k {
-            0 => text.extend_from_slice(&[a, b, c]),
-            1 => text.extend_from_slice(&[a, b, b'.', c]),
-            2 => text.extend_from_slice(&[a, b'.', b, c]),
+            0 => self.extend(&[a, b, c]),
+            1 => self.extend(&[a, b, b'.', c]),
+            2 => self.extend(&[a, b'.', b, c]),
             3..=6 => {
                 let zeros = (k - 3) as usize;
-                text.extend_from_slice(&b"0.000"[..2 + zeros]);
-                text.extend_from_slice(&[a, b, c]);
+                self.extend(&b"0.000"[..2 + zeros]);
+                self.extend(&[a, b, c]);
             }
             _ => {
-                text.extend_from_slice(&[a, b'.', b, c, b'e']);
+                self.extend(&[a, b'.', b, c, b'e']);
                 if k > 2 {
-                    text.push(b'-');
+                    self.extend(b"-");
                 }
                 self.push_count((2 - k).unsigned_abs());
             }
@@ -171,7 +174,7 @@ impl Texts {
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let (ends, rows) = (offsets(&self.ends)?, offsets(&self.rows)?);
-        let texts = StringArray::try_new(ends, Buffer::from(self.text), None);
+        let texts = StringArray::try_new(ends, self.text.into_buffer(), None);
         let texts = texts.map_err(io::Error::other)?;
         Ok((descriptor, lists(rows, Arc::new(texts))))
     }
@@ -201,7 +204,7 @@ mod tests {
         let printed = |x| {
             let mut texts = Texts::default();
             texts.push_number(x);
-            String::from_utf8(texts.text).unwrap()
+            String::from_utf8(texts.text.as_flattened().to_vec()).unwrap()
         };
         for (x, text) in [
             (0.0, "0"),
@@ -238,6 +241,6 @@ mod tests {
             texts.push_count(n);
             texts.push(" ");
         }
-        assert_eq!(texts.text, b"0 7 10 4294967295 ");
+        assert_eq!(texts.text.as_flattened(), b"0 7 10 4294967295 ");
     }
 }

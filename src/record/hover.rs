@@ -66,13 +66,13 @@ impl ParticleRows {
 
     /// The components of `/world/particles`, and those of `/world/disks`.
     pub fn into_columns(self) -> io::Result<(Vec<Column>, Vec<Column>)> {
-        let disks = self.centres.clone();
+        let (points, centres) = self.centres.into_column(Points2D::descriptor_positions())?;
+        let disks = vec![(Ellipses2D::descriptor_centers(), centres.clone())];
         let particles = vec![
-            self.centres.into_column(Points2D::descriptor_positions())?,
+            (points, centres),
             self.colors.into_column(Points2D::descriptor_colors())?,
             self.numbers.into_column(own("softjam.Particle:numbers"))?,
         ];
-        let disks = vec![disks.into_column(Ellipses2D::descriptor_centers())?];
         Ok((particles, disks))
     }
 }

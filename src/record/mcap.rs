@@ -19,7 +19,8 @@ use super::messages::{
     ABOUT, DESCRIPTORS, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS,
     StateMessage, topic,
 };
-use super::pictures::{Network, Particles};
+use super::pictures::Network;
+use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
 use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written};
@@ -72,6 +73,7 @@ pub struct McapRecorder<W: Write> {
     packing: Packing,
     line_tension: f64,
     contours: Contours,
+    redraw: Redraw,
     message: Vec<u8>,
     chunk: Chunk,
     intact: Option<u64>,
@@ -145,6 +147,7 @@ impl<W: Write> McapRecorder<W> {
             sink,
             line_tension: header.scene.line_tension,
             contours: Contours::new(header.scene.contours),
+            redraw: Redraw::new(&header),
             packing: header.packing,
             topics,
             message: Vec::new(),
@@ -160,20 +163,22 @@ impl<W: Write> McapRecorder<W> {
 
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) -> io::Result<()> {
         let step = snapshot.step;
-        if snapshot.contours || snapshot.contacts {
+        let particles = self.redraw.particles(snapshot, frame);
+        let network = self.redraw.contacts(snapshot, frame);
+        if particles.is_some() || network {
             let contacts = FrameContacts::of(&self.packing, frame);
             let contacts = contacts.view();
-            if snapshot.contours {
+            if let Some(particles) = particles {
                 let radii = self.packing.radii();
                 self.contours
                     .draw(radii, &frame.positions, &contacts, self.line_tension);
-                let colors = Particles::of(radii, &contacts).colors();
+                let colors = particles.colors();
                 let lines = contour_lines(step, &self.contours, &colors);
                 let cloud = vertex_cloud(step, &self.contours, &colors);
                 self.send(self.topics.contours, step, &lines)?;
                 self.send(self.topics.vertices, step, &cloud)?;
             }
-            if snapshot.contacts {
+            if network {
                 let network = Network::of(&frame.positions, self.packing.radii(), &contacts);
                 let lines = contact_lines(step, &network);
                 self.send(self.topics.contacts, step, &lines)?;

@@ -28,23 +28,27 @@ mod ipc;
 mod legend;
 mod live;
 mod mcap;
+mod memory;
 pub(crate) mod messages;
 mod pictures;
 mod pipeline;
+mod redraw;
 mod rows;
 mod rrd;
 mod scene_update;
 mod sink;
+mod snapshot;
 mod states;
 mod writer;
 
 pub use live::{Ended, Live, LiveError, Shown, Viewer};
 pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
+pub use snapshot::Snapshot;
 pub use writer::{Writer, Written};
 
-use crate::force::{Backbone, Metrics};
-use crate::frame::Frame;
+pub(crate) use snapshot::{Snapshots, nanoseconds};
+
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::{Channels, Scene};
@@ -114,71 +118,6 @@ impl Header {
             from_step: run.step(),
         }
     }
-}
-
-/// What is recorded of one step.
-///
-/// ```
-/// use softjam::{record::Snapshot, relax::Relaxation, scene::{Channels, Scene, Schedule}};
-///
-/// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-/// let channels = Channels { contours: Schedule::Off, contacts: Schedule::Off, state: Schedule::Off, ..Channels::default() };
-/// let snapshot = Snapshot::of(&run, &channels, false).unwrap();
-/// assert!(snapshot.frame.is_none(), "metrics alone cost no copy of the state");
-/// ```
-#[derive(Clone, Debug)]
-pub struct Snapshot {
-    /// The step.
-    pub step: u64,
-    /// Simulated time in nanoseconds of its unit, rounded towards zero.
-    pub nanoseconds: i64,
-    /// The metrics, if they are recorded.
-    pub metrics: Option<Metrics>,
-    /// The frame, if contours, contacts or state are recorded.
-    pub frame: Option<Frame>,
-    /// Whether contours are recorded.
-    pub contours: bool,
-    /// Whether contacts are recorded.
-    pub contacts: bool,
-    /// Whether the state is recorded.
-    pub state: bool,
-}
-
-impl Snapshot {
-    /// What `channels` ask for at the present step of `run`; `None` if that is nothing. At an `edge`, the first or the last
-    /// step of a recording, every channel that is on records.
-    ///
-    /// See the example of [`Snapshot`].
-    #[must_use]
-    pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
-        Self::counted(run, channels, edge, &mut Backbone::default())
-    }
-
-    /// [`of`](Self::of) with a counter of rattlers that remembers the snapshot before.
-    pub(crate) fn counted(
-        run: &Relaxation,
-        channels: &Channels,
-        edge: bool,
-        backbone: &mut Backbone,
-    ) -> Option<Self> {
-        let step = run.step();
-        let [contours, contacts, metrics, state] = channels.at(step, edge);
-        let frame = contours || contacts || state;
-        (frame || metrics).then(|| Self {
-            step,
-            nanoseconds: nanoseconds(run.time()),
-            metrics: metrics.then(|| run.observables_counted(backbone).metrics()),
-            frame: frame.then(|| run.frame()),
-            contours,
-            contacts,
-            state,
-        })
-    }
-}
-
-/// Simulated time as recordings have it.
-pub(crate) fn nanoseconds(time: f64) -> i64 {
-    (time * 1e9) as i64
 }
 
 /// Turns snapshots into a file of one format.
@@ -387,14 +326,13 @@ pub fn record_live(
     mut watch: impl FnMut(&Relaxation) -> bool,
 ) -> Result<Summary, RecordError> {
     let first = run.step();
-    let mut backbone = Backbone::default();
+    let mut snapshots = Snapshots::default();
     loop {
         let status = run.status();
         let goes_on = watch(run);
         let last = status != Status::Running || !goes_on;
         let edge = last || run.step() == first;
-        if let Some(snapshot) = Snapshot::counted(run, channels, edge, &mut backbone) {
-            let snapshot = Arc::new(snapshot);
+        if let Some(snapshot) = snapshots.take(run, channels, edge) {
             for writer in &mut writers {
                 writer.send(Arc::clone(&snapshot))?;
             }

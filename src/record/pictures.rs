@@ -2,7 +2,8 @@
 
 use crate::contact::Contacts;
 use crate::domain::Vec2;
-use crate::force::held;
+use crate::force::Backbone;
+use crate::frame::Frame;
 use core::f64::consts::PI;
 use std::sync::LazyLock;
 
@@ -23,22 +24,18 @@ pub(super) struct Particles {
     /// Whether it is held by its contacts, that is, no rattler.
     pub held: Vec<bool>,
     /// Mean pressure over the particles that have a contact with `f > 0` (force/length).
-    mean: f64,
+    pub mean: f64,
 }
 
 impl Particles {
-    /// The particles of `radii` with `contacts`.
-    pub fn of(radii: &[f64], contacts: &Contacts<'_>) -> Self {
+    /// The particles of `radii` in `frame`; `backbone` remembers the one before.
+    pub fn of(radii: &[f64], frame: &Frame, backbone: &mut Backbone) -> Self {
         let number = radii.len();
         let (mut pressure, mut counts) = (vec![0.0; number], vec![0; number]);
-        let mut touching = Vec::with_capacity(contacts.pairs.len());
-        for (&[i, j], &f) in contacts.pairs.iter().zip(contacts.forces) {
-            for p in [i as usize, j as usize] {
+        for (pair, &f) in frame.contacts.iter().zip(&frame.forces) {
+            for p in pair.map(|p| p as usize) {
                 pressure[p] += f;
                 counts[p] += u32::from(f > 0.0);
-            }
-            if f > 0.0 {
-                touching.push([i, j]);
             }
         }
         for (p, r) in pressure.iter_mut().zip(radii) {
@@ -47,7 +44,7 @@ impl Particles {
         let pressed = counts.iter().filter(|n| **n > 0).count().max(1);
         Self {
             mean: pressure.iter().sum::<f64>() / pressed as f64,
-            held: held(number, &touching),
+            held: backbone.held(number, &frame.contacts, &frame.forces),
             contacts: counts,
             pressure,
         }

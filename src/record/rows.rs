@@ -4,6 +4,7 @@ use super::columns::StripRows;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
 use super::pictures::{Network, Particles};
+use super::redraw::Redraw;
 use super::states::StateRows;
 use super::{Header, Snapshot};
 use crate::contact::{Contacts, FrameContacts};
@@ -23,6 +24,7 @@ pub(super) struct Rows {
     packing: Packing,
     line_tension: f64,
     contours: Contours,
+    redraw: Redraw,
     pending: Batch,
     states: u64,
     digests: blake3::Hasher,
@@ -55,6 +57,7 @@ impl Rows {
         Self {
             line_tension: header.scene.line_tension,
             contours: Contours::new(header.scene.contours),
+            redraw: Redraw::new(&header),
             packing: header.packing,
             pending: Batch::default(),
             states: 0,
@@ -110,12 +113,14 @@ impl Rows {
     }
 
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
-        if snapshot.contours || snapshot.contacts {
+        let particles = self.redraw.particles(snapshot, frame);
+        let network = self.redraw.contacts(snapshot, frame);
+        if particles.is_some() || network {
             let contacts = FrameContacts::of(&self.packing, frame);
-            if snapshot.contours {
-                self.draw_particles(snapshot, frame, &contacts.view());
+            if let Some(particles) = particles {
+                self.draw_particles(snapshot, frame, &particles, &contacts.view());
             }
-            if snapshot.contacts {
+            if network {
                 self.draw_contacts(snapshot, frame, &contacts.view());
             }
         }
@@ -130,10 +135,15 @@ impl Rows {
         }
     }
 
-    fn draw_particles(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
+    fn draw_particles(
+        &mut self,
+        snapshot: &Snapshot,
+        frame: &Frame,
+        seen: &Particles,
+        contacts: &Contacts<'_>,
+    ) {
         let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
         let (domain, radii) = (self.packing.domain(), self.packing.radii());
-        let seen = Particles::of(radii, contacts);
         let Batch {
             contours,
             contour_images: images,
@@ -150,7 +160,7 @@ impl Rows {
                 });
             }
             particles.particle(
-                (&seen, p),
+                (seen, p),
                 (centre, color),
                 extent.deepest / radii[p],
                 line_tension,

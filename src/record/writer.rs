@@ -10,8 +10,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-/// Snapshots that may wait for the disk before the run does.
+/// So many messages may wait for the disk before the run does, or more if they hold no more than so many bytes: while a run
+/// rearranges, its pictures are drawn more slowly than it goes on, and later there are few.
 const QUEUE: usize = 8;
+const QUEUE_BYTES: usize = 1 << 25;
 
 /// Snapshots are handed over together until they span so many steps, or their frames hold so many bytes: waking the thread costs
 /// more than the metrics of a step.
@@ -112,7 +114,10 @@ impl Writer {
                 source,
             },
         })?;
-        let (queue, messages) = sync_channel(QUEUE);
+        // What a frame holds of each particle, with 2.5 contacts.
+        let frame = 72 * header.packing.len();
+        let room = QUEUE.max(QUEUE_BYTES / frame.max(TOGETHER_BYTES));
+        let (queue, messages) = sync_channel(room);
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())
             .spawn(move || match format {

@@ -169,6 +169,8 @@ impl Scene {
         for (name, schedule) in self.channels.named() {
             page.line(name, quoted(&schedule.to_string()));
         }
+        page.text("# Contours and contacts are drawn anew when a particle has moved by more than this (mean radii), or a pressure or\n# force has changed by more than five times this (means), since they were last drawn; 0 draws every time.");
+        page.line("redraw", number(self.channels.redraw));
     }
 }
 

@@ -131,7 +131,7 @@ impl<'de> serde::Deserialize<'de> for Schedule {
     }
 }
 
-/// A schedule for each of the four channels.
+/// A schedule for each of the four channels, and when a picture would look like the one before.
 ///
 /// # Example
 ///
@@ -141,7 +141,7 @@ impl<'de> serde::Deserialize<'de> for Schedule {
 /// let channels = Channels::default();
 /// assert_eq!(channels.metrics, Schedule::Every(1));
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Channels {
     /// Particle polygons.
@@ -152,6 +152,10 @@ pub struct Channels {
     pub metrics: Schedule,
     /// The lossless state, without which a recording can be looked at but not replayed.
     pub state: Schedule,
+    /// A picture that its schedule asks for is left out as long as the one before it is right to this: no particle has moved
+    /// by more than `redraw` mean radii since, no pressure on a particle or force has changed by more than `5 redraw` of
+    /// their mean, and none has begun or ceased to rattle. 0 … 1; at 0 none is left out.
+    pub redraw: f64,
 }
 
 impl Default for Channels {
@@ -161,6 +165,7 @@ impl Default for Channels {
             contacts: Schedule::Every(10),
             metrics: Schedule::Every(1),
             state: Schedule::Every(10),
+            redraw: 0.01,
         }
     }
 }

@@ -3,6 +3,9 @@
 use super::{Radii, Scene, SceneError, Start};
 use crate::contact::solver::Method;
 
+/// What may wait for the recorder however small the packing is (bytes).
+const QUEUE: u64 = 1 << 25;
+
 impl Scene {
     /// Checks every field, whatever way the scene was made.
     ///
@@ -41,6 +44,12 @@ impl Scene {
             self.contours.vertices as f64,
             (3..=4096).contains(&self.contours.vertices),
             "3 ≤ vertices ≤ 4096 (equally spaced vertices a contour)",
+        )?;
+        within(
+            "channels.redraw",
+            self.channels.redraw,
+            (0.0..=1.0).contains(&self.channels.redraw),
+            "0 ≤ redraw ≤ 1 (mean radii)",
         )?;
         if let Start::File { .. } = self.start {
             return Ok(());
@@ -174,7 +183,7 @@ impl Scene {
         } else {
             0
         };
-        n * (4_000 + 4_000 * u64::from(frames) + 24 * 4 * vertices) + dense
+        n * (4_000 + 4_000 * u64::from(frames) + 24 * 4 * vertices) + dense + QUEUE
     }
 }
 

@@ -27,6 +27,8 @@ mod program;
 #[cfg(feature = "recording")]
 mod recording;
 #[cfg(feature = "recording")]
+mod redraw;
+#[cfg(feature = "recording")]
 mod replay;
 mod scenes;
 #[cfg(feature = "recording")]

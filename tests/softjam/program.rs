@@ -287,7 +287,7 @@ fn an_interrupted_run_leaves_a_readable_recording() {
 #[test]
 fn metrics_alone_cost_no_contour_and_no_state() {
     let folder = folder();
-    let full = record(folder.path(), "full.rrd", &[]);
+    let full = record(folder.path(), "full.rrd", &["--redraw", "0"]);
     let metrics = record(folder.path(), "metrics.rrd", &["--channels", "metrics"]);
     let size = |p: &Path| std::fs::metadata(p).expect("a file").len();
     assert!(size(&metrics) * 5 < size(&full));

@@ -204,6 +204,7 @@ fn rare_metrics_reach_the_file_while_the_run_goes_on() {
                 contours: false,
                 contacts: false,
                 state: false,
+                edge: false,
             };
             writer.send(snapshot).expect("room");
         };

@@ -21,6 +21,7 @@ fn scene() -> Scene {
             contacts: Schedule::Every(100),
             metrics: Schedule::Every(1),
             state: Schedule::Every(20),
+            ..Channels::default()
         },
         ..Scene::default()
     }

@@ -167,6 +167,7 @@ fn without_frame(snapshot: &Snapshot) -> Snapshot {
         contours: false,
         contacts: false,
         state: false,
+        edge: false,
     }
 }
 

@@ -1,0 +1,140 @@
+//! Which pictures would look like the ones before them, and need not be drawn again.
+//!
+//! Near balance nothing moves that an eye could see, and pictures are most of a recording's bytes. So a picture is left out
+//! as long as the one before it is right to [`Channels::redraw`](crate::scene::Channels::redraw); the viewers show the
+//! latest one. The states are untouched by it. What is left out depends on the scheduled frames alone, so two runs of a
+//! scene and a conversion leave out the same.
+
+use super::pictures::{Particles, mean};
+use super::{Header, Snapshot};
+use crate::domain::{Domain, Vec2};
+use crate::force::Backbone;
+use crate::frame::Frame;
+
+/// How much more a pressure or a force may change, in means, than a particle may move, in mean radii: at the default of 0.01
+/// this is two hundredths of a colour map.
+const SHARE: f64 = 5.0;
+
+/// Decides for each frame, in order, which of its pictures are drawn.
+pub(super) struct Redraw {
+    domain: Domain,
+    radii: Vec<f64>,
+    /// How far a particle may have moved (length).
+    distance: f64,
+    /// By how much a pressure or a force may have changed (means).
+    share: f64,
+    backbone: Backbone,
+    particles: Option<DrawnParticles>,
+    contacts: Option<DrawnContacts>,
+}
+
+/// What the last picture of the particles shows.
+struct DrawnParticles {
+    positions: Vec<Vec2>,
+    pressure: Vec<f64>,
+    held: Vec<bool>,
+}
+
+/// What the last picture of the contacts shows.
+struct DrawnContacts {
+    positions: Vec<Vec2>,
+    pairs: Vec<[u32; 2]>,
+    forces: Vec<f64>,
+}
+
+impl Redraw {
+    /// For the recording that `header` begins.
+    pub fn new(header: &Header) -> Self {
+        let (packing, redraw) = (&header.packing, header.scene.channels.redraw);
+        Self {
+            domain: packing.domain(),
+            radii: packing.radii().to_vec(),
+            distance: redraw * mean(packing.radii()),
+            share: SHARE * redraw,
+            backbone: Backbone::default(),
+            particles: None,
+            contacts: None,
+        }
+    }
+
+    /// What is seen of the particles of `frame`, if they have to be drawn for `snapshot`.
+    pub fn particles(&mut self, snapshot: &Snapshot, frame: &Frame) -> Option<Particles> {
+        if !snapshot.contours {
+            return None;
+        }
+        let now = Particles::of(&self.radii, frame, &mut self.backbone);
+        let stays = self.particles.as_ref().is_some_and(|before| {
+            let least = self.share * now.mean;
+            before.held == now.held
+                && within(&before.pressure, &now.pressure, least)
+                && self.stand(&before.positions, &frame.positions)
+        });
+        if stays && !snapshot.edge {
+            return None;
+        }
+        self.particles = Some(DrawnParticles {
+            positions: frame.positions.clone(),
+            pressure: now.pressure.clone(),
+            held: now.held.clone(),
+        });
+        Some(now)
+    }
+
+    /// Whether the contacts of `frame` have to be drawn for `snapshot`.
+    pub fn contacts(&mut self, snapshot: &Snapshot, frame: &Frame) -> bool {
+        if !snapshot.contacts {
+            return false;
+        }
+        let stays = self.contacts.as_ref().is_some_and(|before| {
+            let number = frame.forces.len().max(1) as f64;
+            let least = self.share * frame.forces.iter().sum::<f64>() / number;
+            self.stand(&before.positions, &frame.positions) && before.bears_as(frame, least)
+        });
+        if stays && !snapshot.edge {
+            return false;
+        }
+        self.contacts = Some(DrawnContacts {
+            positions: frame.positions.clone(),
+            pairs: frame.contacts.clone(),
+            forces: frame.forces.clone(),
+        });
+        true
+    }
+
+    /// Whether no particle has moved too far.
+    fn stand(&self, before: &[Vec2], now: &[Vec2]) -> bool {
+        // At 0 a picture is left out for no reason, however alike.
+        self.distance > 0.0
+            && before.iter().zip(now).all(|(a, b)| {
+                let moved = self.domain.minimum_image(b - a);
+                moved.norm_squared() <= self.distance * self.distance
+            })
+    }
+}
+
+impl DrawnContacts {
+    /// Whether the forces of `frame` differ by no more than `least`; a pair without a contact bears none.
+    fn bears_as(&self, frame: &Frame, least: f64) -> bool {
+        if self.pairs == frame.contacts {
+            return within(&self.forces, &frame.forces, least);
+        }
+        let mut before = self.pairs.iter().zip(&self.forces).peekable();
+        for (pair, force) in frame.contacts.iter().zip(&frame.forces) {
+            while let Some((_, gone)) = before.next_if(|(p, _)| *p < pair) {
+                if *gone > least {
+                    return false;
+                }
+            }
+            let same = before.next_if(|(p, _)| *p == pair);
+            if (force - same.map_or(0.0, |(_, f)| *f)).abs() > least {
+                return false;
+            }
+        }
+        before.all(|(_, gone)| *gone <= least)
+    }
+}
+
+/// Whether numbers differ by no more than `least`.
+fn within(a: &[f64], b: &[f64], least: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= least)
+}
