@@ -29,6 +29,8 @@ pub struct Packing {
     domain: Domain,
     /// Shared by the copies of a packing, since they never change.
     radii: Arc<[f64]>,
+    /// The smallest and the largest of them, which every step asks for.
+    extremes: [f64; 2],
     positions: Vec<Vec2>,
 }
 
@@ -121,9 +123,12 @@ impl Packing {
             }
             *p = domain.wrap(*p);
         }
+        let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = radii.iter().copied().fold(0.0, f64::max);
         Ok(Self {
             domain,
             radii: radii.into(),
+            extremes: [smallest, largest],
             positions,
         })
     }
@@ -174,12 +179,12 @@ impl Packing {
     /// ```
     #[must_use]
     pub fn largest_radius(&self) -> f64 {
-        self.radii.iter().copied().fold(0.0, f64::max)
+        self.extremes[1]
     }
 
     /// The smallest undeformed radius.
     pub(crate) fn smallest_radius(&self) -> f64 {
-        self.radii.iter().copied().fold(f64::INFINITY, f64::min)
+        self.extremes[0]
     }
 
     /// The centres `r_i`, wrapped into the box.

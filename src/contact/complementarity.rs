@@ -29,6 +29,7 @@ use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::packing::Packing;
 use crate::threads::both;
+use crate::wide::wide;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
@@ -271,6 +272,10 @@ impl ContactLaw {
     /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
         let reach = |p: usize| packing.radii()[p] + self.bulges.of(p);
+        let farthest = packing.largest_radius() + self.bulges.largest();
+        if self.absurd.is_none() && 4.0 * farthest <= packing.domain().shortest() {
+            return Ok(());
+        }
         let tolerance = ACCEPTED * self.allowed(self.scale());
         let loaded = Loaded {
             packing,
@@ -321,12 +326,23 @@ impl ContactLaw {
         self.offending.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
-        let rows = self.forces.iter().zip(self.matrix.scaling());
-        for (contact, (&f, &scaling)) in rows.enumerate() {
-            if f <= 0.0 && scaling > 0.0 {
-                self.offending
-                    .push(Offence::Drop(contact, self.pairs[contact]));
-                worst = worst.max(-f * self.matrix.diagonal()[contact]);
+        let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
+        let rows = self.forces.chunks(64).zip(self.matrix.scaling().chunks(64));
+        for (k, (forces, scaling)) in rows.enumerate() {
+            let rows = || forces.iter().zip(scaling);
+            let any = wide(
+                #[inline(always)]
+                || rows().fold(false, |any, (f, s)| any | (pulls(*f, *s))),
+            );
+            if !any {
+                continue;
+            }
+            for (contact, (&f, &s)) in (64 * k..).zip(rows()) {
+                if pulls(f, s) {
+                    self.offending
+                        .push(Offence::Drop(contact, self.pairs[contact]));
+                    worst = worst.max(-f * self.matrix.diagonal()[contact]);
+                }
             }
         }
         self.work.distances += (self.others.len() + self.at_rest.len()) as u64;

@@ -338,12 +338,22 @@ pub(super) fn gap_of<F: Iterator<Item = (f64, Direction)>>(
     let (normal, distance) = unit_and_length(packing.separation(i, j));
     let overlap = packing.radii()[i] + packing.radii()[j] - distance;
     let to_j = Direction::of(-normal);
-    // ΔR_p in a direction, Saitoh (3): (R_p / 2πγ) Σ_k f_pk g(θ − θ_k).
     let mut bulge = |p: usize, direction: Direction| {
-        let sum: f64 = forces(p).map(|(f, d)| f * direction.g_between(d)).sum();
-        packing.radii()[p] / (2.0 * PI * line_tension) * sum
+        bulge_toward(direction, packing.radii()[p], line_tension, forces(p))
     };
     -overlap - bulge(i, to_j) - bulge(j, to_j.opposite())
+}
+
+/// How far a particle of `radius` reaches beyond its undeformed disk in a direction (length), Saitoh (3): `ΔR(θ) = (R/2πγ) Σ_k f_k
+/// g(θ − θ_k)` of its `forces` and the directions that they come from.
+pub(super) fn bulge_toward(
+    direction: Direction,
+    radius: f64,
+    line_tension: f64,
+    forces: impl Iterator<Item = (f64, Direction)>,
+) -> f64 {
+    let sum: f64 = forces.map(|(f, d)| f * direction.g_between(d)).sum();
+    radius / (2.0 * PI * line_tension) * sum
 }
 
 /// Contacts that are computed together.
