@@ -94,7 +94,7 @@ pub(crate) fn nanoseconds(time: f64) -> i64 {
 #[derive(Default)]
 pub(crate) struct Snapshots {
     backbone: Backbone,
-    /// Snapshots with a frame that others may still hold, in the order in which they were taken.
+    /// Snapshots with a frame that others may still hold.
     out: VecDeque<Arc<Snapshot>>,
     /// Frames that nobody needs.
     free: Vec<Frame>,
@@ -114,9 +114,12 @@ impl Snapshots {
             free,
         } = self;
         let room = || {
-            while out.front().is_some_and(|held| Arc::strong_count(held) == 1) {
-                let snapshot = out.pop_front().and_then(Arc::into_inner);
-                free.extend(snapshot.and_then(|snapshot| snapshot.frame));
+            // Two for each that is taken, so that they do not become more and more behind one that is held for long.
+            for snapshot in [out.pop_front(), out.pop_front()].into_iter().flatten() {
+                match Arc::try_unwrap(snapshot) {
+                    Ok(snapshot) => free.extend(snapshot.frame),
+                    Err(held) => out.push_back(held),
+                }
             }
             free.pop().unwrap_or_default()
         };
@@ -125,5 +128,38 @@ impl Snapshots {
             out.push_back(Arc::clone(&snapshot));
         }
         Some(snapshot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn frames_that_nobody_holds_serve_again_whatever_others_hold() {
+        let scene = Scene {
+            particles: 16,
+            ..Scene::default()
+        };
+        let run = Relaxation::new(&scene).unwrap();
+        let mut snapshots = Snapshots::default();
+        let mut take = || snapshots.take(&run, &scene.channels, true).unwrap();
+        let (first, mut queue, mut places) = (take(), VecDeque::new(), Vec::new());
+        for _ in 0..1000 {
+            let snapshot = take();
+            let frame = snapshot.frame.as_ref().unwrap();
+            assert_eq!(*frame, run.frame());
+            places.push(frame.positions.as_ptr());
+            queue.push_back(snapshot);
+            if queue.len() > 5 {
+                queue.pop_front();
+            }
+        }
+        places.sort_unstable();
+        places.dedup();
+        assert!(places.len() < 30, "{} places for 1000 frames", places.len());
+        assert!(snapshots.out.len() + snapshots.free.len() < 30);
+        assert_eq!(first.frame.as_ref().unwrap(), &run.frame(), "never touched");
     }
 }

@@ -7,6 +7,7 @@ For every recorded state (or every K-th, with --every K):
   balance        the largest net force, against the recorded f_max
   pressure, U    from forces and distances, against the recorded metrics
   contours       every vertex against rho_i(theta) at its own angle
+  left out       how far the latest contours and contacts are from a state that has none of its own
   beside them    periodic images of contours and contacts, undeformed disks, the numbers of particles and contacts
 
 usage: check_recording.py RUN.rrd [--every K]      (pip install rerun-sdk==0.36.3 numpy)
@@ -55,6 +56,7 @@ class Recording:
                 self.gradient = scene.get("forces", "central") == "gradient"
                 self.threshold, self.tolerance = scene["threshold"], scene["contact_tolerance"]
                 self.seed_rule = scene["contact_rule"] == "seed"
+                self.channels = scene["channels"]
             if entity in BESIDE and not chunk.is_static:
                 columns = [batch[name] for name in BESIDE[entity]]
                 self.beside[entity] |= dict(zip(batch["step"].to_pylist(), zip(*columns)))
@@ -264,6 +266,39 @@ def check_beside(recording, step, state, around, gamma, single):
     return count, worst
 
 
+def check_left_out(recording, step, state, gamma):
+    """How far the pictures shown at a step are from its state, over what `redraw` allows: 0 where they are its own."""
+    positions, contacts, forces = state
+    worst, redraw = 0.0, recording.channels["redraw"]
+    for entity, channel in (("/world/particles", "contours"), ("/world/contacts", "contacts")):
+        rows = recording.beside[entity]
+        kind, _, k = recording.channels[channel].partition(" ")
+        # Of a step that is not on the schedule nothing is said.
+        if not rows or step in rows or kind != "every" or step % int(k):
+            continue
+        drawn = max(k for k in rows if k <= step)
+        # States may be thinned more than pictures.
+        if drawn not in recording.states:
+            continue
+        before, pairs, loads = recording.states[drawn]
+        moved = np.linalg.norm(nearest(positions - before, recording.box), axis=1)
+        worst = max(worst, moved.max() / (redraw * recording.radii.mean()))
+        if channel == "contacts":
+            change = {tuple(pair): -f for pair, f in zip(pairs.tolist(), loads)}
+            for pair, f in zip(contacts.tolist(), forces):
+                change[tuple(pair)] = change.get(tuple(pair), 0.0) + f
+            change, mean = np.array(list(change.values())), forces.mean()
+        else:
+            n = len(recording.radii)
+            pressure = lambda c, f: np.bincount(c.ravel(), np.repeat(f, 2), n) / recording.radii
+            change = pressure(contacts, forces) - pressure(pairs, loads)
+            mean = (now := pressure(contacts, forces))[now > 0].mean()
+            if list(rattles(n, contacts)) != list(rattles(n, pairs)):
+                sys.exit(f"step {step}: a rattler has changed since the picture of step {drawn}")
+        worst = max(worst, np.abs(change).max() / (5 * redraw * mean))
+    return worst
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("path")
@@ -273,8 +308,9 @@ def main():
     gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
-    worst = dict.fromkeys(("eq4", "gap", "force", "f_max", "pressure", "energy", "contour", "beside"), 0.0)
-    vertices, count = 0, 0
+    checks = ("eq4", "gap", "force", "f_max", "pressure", "energy", "contour", "beside", "left out")
+    worst = dict.fromkeys(checks, 0.0)
+    vertices, count, latest = 0, 0, 0
     # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
     single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
     for step in steps:
@@ -294,6 +330,8 @@ def main():
             worst["contour"] = max(worst["contour"], contour)
         more, beside = check_beside(recording, step, state, found["around"], gamma, single)
         count, worst["beside"] = count + more, max(worst["beside"], beside)
+        latest += step not in recording.contours
+        worst["left out"] = max(worst["left out"], check_left_out(recording, step, state, gamma))
     limits = {
         "eq4": (1.0, "eq. (4), |A f - delta| over what the frame's f_max allows"),
         "gap": (1.0, "overlap of pairs that are not contacts over what f_max allows"),
@@ -303,6 +341,7 @@ def main():
         "energy": (1e-9, "energy against the recorded one"),
         "contour": (single, f"contour vertex off rho(theta), {vertices} vertices"),
         "beside": (2e-7, f"numbers of particles and contacts, beside {count} periodic images"),
+        "left out": (1 + 1e-9, f"the latest picture over what redraw allows, {latest} states without contours of their own"),
     }
     last = steps[-1]
     print(f"{arguments.path}: {len(steps)} states up to step {last}, recorded f_max = {recording.metrics['f_max'][last]:.3e}")
