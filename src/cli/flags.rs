@@ -94,7 +94,8 @@ pub struct ChannelFlags {
     every: Option<i64>,
 
     /// Draw contours and contacts anew when a particle has moved by more than this (mean radii), or a pressure or force has
-    /// changed by more than five times this (means); 0 draws them whenever they are scheduled [default: 0.01].
+    /// changed by more than five times this (means); 0 draws them whenever they are scheduled [default: as in the scene or the
+    /// recording; 0.01 in the default scene].
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = real, help_heading = RECORDING)]
     redraw: Option<f64>,
 }

@@ -114,7 +114,9 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if let Some(e) = error.downcast_ref::<SceneError>() {
         return scene(e);
     }
-    if let Some(ConvertError::NoState { .. }) = error.downcast_ref::<ConvertError>() {
+    if let Some(ConvertError::NoState { .. } | ConvertError::Scene(_)) =
+        error.downcast_ref::<ConvertError>()
+    {
         return 2;
     }
     if let Some(FigureError::Name { .. } | FigureError::Nothing(_)) =

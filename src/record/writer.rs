@@ -10,8 +10,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-/// So many messages may wait for the disk before the run does, or more if they hold no more than so many bytes: while a run
-/// rearranges, its pictures are drawn more slowly than it goes on, and later there are few.
+/// So many messages may wait for the disk before the run does; of an `.rrd` more, if they hold no more than so many bytes: while a
+/// run rearranges, its pictures are drawn more slowly than it goes on, and later there are few. MCAP takes ten times as long for a
+/// picture, so much would wait for long.
 const QUEUE: usize = 8;
 const QUEUE_BYTES: usize = 1 << 25;
 
@@ -116,7 +117,10 @@ impl Writer {
         })?;
         // What a frame holds of each particle, with 2.5 contacts.
         let frame = 72 * header.packing.len();
-        let room = QUEUE.max(QUEUE_BYTES / frame.max(TOGETHER_BYTES));
+        let room = match format {
+            Format::Rrd => QUEUE.max(QUEUE_BYTES / frame.max(TOGETHER_BYTES)),
+            Format::Mcap => QUEUE,
+        };
         let (queue, messages) = sync_channel(room);
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())

@@ -80,11 +80,18 @@ pub(super) fn check_version(path: &str, found: u32) -> Result<(), ReadError> {
 }
 
 /// The scene in a file, and the BLAKE3 of its text as it stands there: a version that prints scenes otherwise reads on.
+///
+/// A recording that does not say when pictures are drawn anew has every one of them.
 pub(super) fn read_scene(path: &str, toml: &str) -> Result<(Scene, [u8; 32]), ReadError> {
-    let scene = Scene::from_toml(toml).map_err(|source| ReadError::Scene {
+    let mut scene = Scene::from_toml(toml).map_err(|source| ReadError::Scene {
         path: path.to_owned(),
         source,
     })?;
+    let table = toml.parse::<toml::Table>().unwrap_or_default();
+    let channels = table.get("channels");
+    if channels.and_then(|named| named.get("redraw")).is_none() {
+        scene.channels.redraw = 0.0;
+    }
     Ok((scene, *blake3::hash(toml.as_bytes()).as_bytes()))
 }
 
@@ -128,4 +135,21 @@ pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T
 #[must_use]
 pub fn reading_damaged_bytes() -> bool {
     GUARDED.get()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recordings_that_do_not_say_when_pictures_are_drawn_have_all_of_them() {
+        let text = Scene::default().to_toml();
+        let redraw = |text: &str| read_scene("test", text).unwrap().0.channels.redraw;
+        assert_eq!(redraw(&text), Scene::default().channels.redraw);
+        let lines = text.lines().filter(|line| !line.starts_with("redraw"));
+        let before: Vec<&str> = lines.collect();
+        assert_eq!(before.len() + 1, text.lines().count());
+        assert_eq!(redraw(&before.join("\n")), 0.0);
+        assert_eq!(redraw("particles = 64"), 0.0);
+    }
 }

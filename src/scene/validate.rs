@@ -3,8 +3,9 @@
 use super::{Minimizer, Radii, Scene, SceneError, Start};
 use crate::contact::solver::Method;
 
-/// What may wait for the recorder however small the packing is (bytes).
-const QUEUE: u64 = 1 << 25;
+/// What waits for a recorder or is under way in it, and in a second one or a live view, does not grow beyond this (bytes); 100 kB
+/// a particle if that is less.
+const UNDER_WAY: u64 = 1 << 27;
 
 impl Scene {
     /// Checks every field, whatever way the scene was made.
@@ -191,7 +192,7 @@ impl Scene {
             0
         };
         let each = 4_000 + 4_000 * u64::from(frames) + 24 * 4 * vertices + newton;
-        n * each + dense + QUEUE
+        n * each + dense + UNDER_WAY.min(100_000 * n)
     }
 }
 

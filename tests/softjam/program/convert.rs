@@ -3,6 +3,20 @@
 use super::{folder, record, run};
 
 #[test]
+fn a_conversion_to_channels_out_of_range_makes_no_sense() {
+    let folder = folder();
+    let (code, _, errors) = run(folder.path(), &["record", "-N", "16", "-o", "a.rrd"]);
+    assert_eq!(code, Some(0), "{errors}");
+    for redraw in ["2", "-1", "nan"] {
+        let line = ["convert", "a.rrd", "b.rrd", "--redraw", redraw];
+        let (code, _, errors) = run(folder.path(), &line);
+        assert_eq!(code, Some(2), "{errors}");
+        assert!(errors.contains("0 ≤ redraw ≤ 1"), "{errors}");
+        assert!(!folder.path().join("b.rrd").exists());
+    }
+}
+
+#[test]
 fn one_run_writes_either_format_or_both() {
     let folder = folder();
     record(folder.path(), "a.rrd", &["--mcap", "a.mcap"]);
