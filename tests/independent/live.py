@@ -122,14 +122,16 @@ def colours(port, name):
     return share
 
 
-record("-o", "alone.rrd")
+# Every picture is drawn, so that there is much to compare.
+every = ["--redraw", "0"]
+record("-o", "alone.rrd", *every)
 alone = Path("alone.rrd").read_bytes()
 
 # 1. A receiver that keeps what it gets.
 port = free_port()
 receiver = start("--port", str(port), "--save", "received.rrd")
 wait_for(port)
-done, _ = record("-o", "run.rrd", "--connect", address(port))
+done, _ = record("-o", "run.rrd", *every, "--connect", address(port))
 assert Path("run.rrd").read_bytes() == alone, "the file differs"
 assert "live view" in done.stdout, done.stdout + done.stderr
 time.sleep(1)
@@ -145,7 +147,7 @@ if pictures:
     viewer = start("--headless", "--port", str(port))
     wait_for(port)
     for _ in range(2):
-        record("-o", "run.rrd", "--connect", address(port))
+        record("-o", "run.rrd", *every, "--connect", address(port))
         print(f"viewer: {colours(port, 'connect.png'):.1%} of the picture is coloured")
     stop(viewer)
 
@@ -155,14 +157,14 @@ if pictures:
     Path("bin/rerun").write_text(f'#!/bin/sh\necho $$ >"{folder}/spawned"\nexec "{real}" --headless "$@"\n')
     Path("bin/rerun").chmod(0o755)
     port = free_port()
-    done, took = record("-o", "run.rrd", f"--spawn={port}", env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
+    done, took = record("-o", "run.rrd", *every, f"--spawn={port}", env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
     assert Path("run.rrd").read_bytes() == alone, "the file differs"
     assert "live view" in done.stdout, done.stdout + done.stderr
     groups.add(int(Path("spawned").read_text()))
     print(f"--spawn: {took:.1f} s with the viewer's start, {colours(port, 'spawn.png'):.1%} of the picture is coloured")
 
 # 4. A viewer that is killed in the middle of a longer run.
-longer = ["-N", "512", "--phi", "0.86", "--every", "1"]
+longer = ["-N", "512", "--phi", "0.86", "--every", "1", *every]
 _, usual = record("-o", "alone.rrd", *longer)
 port = free_port()
 viewer = start("--port", str(port), "--save", "killed.rrd")
