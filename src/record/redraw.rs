@@ -64,9 +64,9 @@ impl Redraw {
         }
         let now = Particles::of(&self.radii, frame, &mut self.backbone);
         let stays = self.particles.as_ref().is_some_and(|before| {
-            let least = self.share * now.mean;
+            let most = self.share * now.mean;
             before.held == now.held
-                && within(&before.pressure, &now.pressure, least)
+                && within(&before.pressure, &now.pressure, most)
                 && self.stand(&before.positions, &frame.positions)
         });
         if stays && !snapshot.edge {
@@ -87,8 +87,8 @@ impl Redraw {
         }
         let stays = self.contacts.as_ref().is_some_and(|before| {
             let number = frame.forces.len().max(1) as f64;
-            let least = self.share * frame.forces.iter().sum::<f64>() / number;
-            self.stand(&before.positions, &frame.positions) && before.bears_as(frame, least)
+            let most = self.share * frame.forces.iter().sum::<f64>() / number;
+            self.stand(&before.positions, &frame.positions) && before.bears_as(frame, most)
         });
         if stays && !snapshot.edge {
             return false;
@@ -113,28 +113,28 @@ impl Redraw {
 }
 
 impl DrawnContacts {
-    /// Whether the forces of `frame` differ by no more than `least`; a pair without a contact bears none.
-    fn bears_as(&self, frame: &Frame, least: f64) -> bool {
+    /// Whether the forces of `frame` differ by no more than `most`; a pair without a contact bears none.
+    fn bears_as(&self, frame: &Frame, most: f64) -> bool {
         if self.pairs == frame.contacts {
-            return within(&self.forces, &frame.forces, least);
+            return within(&self.forces, &frame.forces, most);
         }
         let mut before = self.pairs.iter().zip(&self.forces).peekable();
         for (pair, force) in frame.contacts.iter().zip(&frame.forces) {
             while let Some((_, gone)) = before.next_if(|(p, _)| *p < pair) {
-                if *gone > least {
+                if *gone > most {
                     return false;
                 }
             }
             let same = before.next_if(|(p, _)| *p == pair);
-            if (force - same.map_or(0.0, |(_, f)| *f)).abs() > least {
+            if (force - same.map_or(0.0, |(_, f)| *f)).abs() > most {
                 return false;
             }
         }
-        before.all(|(_, gone)| *gone <= least)
+        before.all(|(_, gone)| *gone <= most)
     }
 }
 
-/// Whether numbers differ by no more than `least`.
-fn within(a: &[f64], b: &[f64], least: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= least)
+/// Whether numbers differ by no more than `most`.
+fn within(a: &[f64], b: &[f64], most: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most)
 }
