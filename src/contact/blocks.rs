@@ -1,7 +1,8 @@
 //! Where the blocks of a [`ContactMatrix`] are, and how contacts come and go without a new structure.
 
 use super::list::{ContactList, DuplicateContactList};
-use super::matrix::{ContactMatrix, Geometry, Known};
+use super::matrix::{ContactMatrix, Geometry, Known, Units};
+use super::sight::{Sight, rounding};
 use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
 use crate::wide::wide;
@@ -76,6 +77,12 @@ impl ContactMatrix {
             self.diagonal.push(compliance(per_radius, sum));
         }
         self.largest_root = compliance(per_radius, 2.0 * packing.largest_radius()).sqrt();
+        let root = (packing.largest_radius() * per_radius).sqrt();
+        self.units = Units {
+            root,
+            load: root * line_tension,
+            rounding: rounding(packing),
+        };
         self.scaling.resize(contacts.len(), 0.0);
         self.scale.clear();
         let scale = |r: &f64| -r * per_radius;
@@ -111,6 +118,8 @@ impl ContactMatrix {
         }
         self.value.resize(value, 0.0);
         self.scaled.resize(value, 0.0);
+        self.sights.resize(self.pairs.len(), Sight::default());
+        self.loads.resize(self.pairs.len(), 0.0);
     }
 
     /// Adds one more contact, with the next number: `duplicate` has it already. Its particles' blocks move to the end.
@@ -129,6 +138,8 @@ impl ContactMatrix {
         self.pairs.push(pair);
         self.diagonal.push(compliance);
         self.scaling.push(root_of_inverse(compliance));
+        self.sights.push(Sight::default());
+        self.loads.push(0.0);
         for p in pair {
             self.remove_block(p);
             let run = Run {
@@ -241,6 +252,7 @@ impl ContactMatrix {
             scale: self.scale.clone(),
             pairs: contacts.pairs().collect(),
             largest_root: self.largest_root,
+            units: self.units,
             ..Self::default()
         };
         some.lay_out(geometry.duplicate());

@@ -24,7 +24,10 @@
 use super::error::ContactError;
 use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
+use super::matrix::Precision;
+use super::product::First;
 use super::search::At;
+use super::sight::rounding;
 use super::solver::{LinearSolver, Progress, SolverError};
 use super::tolerance::ACCEPTED;
 use crate::packing::Packing;
@@ -36,6 +39,9 @@ pub(super) const WIDEST_BULGE: f64 = 5.0;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
 const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
+
+/// How many times the rounding of single precision a tolerance has to be for a solution to begin with it.
+const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +66,7 @@ impl ContactLaw {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
         let (mut best, mut mends) = (usize::MAX, 3);
+        self.precision = self.precision_for(packing);
         let mut patience = PATIENCE;
         for _ in 0..most {
             self.sweep(packing)?;
@@ -95,6 +102,17 @@ impl ContactLaw {
         })
     }
 
+    /// What the first residual of a solution has to be computed in, going by the contacts found last.
+    fn precision_for(&self, packing: &Packing) -> Precision {
+        let scale = self.scale();
+        let coarse = self.slack > 0.0 && self.allowed(scale) >= COARSE * rounding(packing) * scale;
+        if coarse && matches!(self.solver, LinearSolver::ConjugateGradient(_)) {
+            Precision::Single
+        } else {
+            Precision::Double
+        }
+    }
+
     /// Whether few contacts offend, and the tolerance is one that a sum of residuals may be held against.
     fn is_mendable(&self) -> bool {
         let scale = self.scale();
@@ -124,7 +142,11 @@ impl ContactLaw {
         let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
         let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
         self.matrix.keeps_values = direct || !loosely;
-        if direct || !multiplied {
+        let in_single = self.precision == Precision::Single;
+        if !multiplied && in_single {
+            let (geometry, products) = (&self.geometry, &mut self.products);
+            self.matrix.fill_in_single(geometry, &self.forces, products);
+        } else if direct || !multiplied {
             self.matrix.complete(&self.geometry);
         }
         let (overlaps, forces) = (self.geometry.overlaps(), &mut self.forces[..]);
@@ -132,7 +154,12 @@ impl ContactLaw {
             return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
         };
         let goal = (tolerance, loosely);
-        let from = (multiplied.then_some(self.products.sums()), 0);
+        let products = if in_single {
+            Some(First::Single(self.products.single.sums()))
+        } else {
+            multiplied.then_some(First::Double(self.products.double.sums()))
+        };
+        let from = (products, 0);
         let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
         if let Progress::NeedsValues(iterations) = progress {
             self.matrix.complete(&self.geometry);
@@ -171,7 +198,8 @@ impl ContactLaw {
         if anew {
             let (geometry, products) = (&mut self.geometry, &mut self.products);
             let at = (packing, &self.pairs[..], &self.forces[..]);
-            self.scale = self.matrix.refresh(geometry, at, products);
+            self.scale = self.matrix.refresh(geometry, at, products, self.precision);
+            self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
             (self.structured, self.refreshed) = (true, true);
         } else {
@@ -230,7 +258,7 @@ impl ContactLaw {
     pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
         self.bound_bulges(packing);
-        let tolerance = ACCEPTED * self.allowed(scale);
+        let tolerance = self.passed_over(scale);
         let worst = self.off.max(self.find_offences(packing, tolerance));
         self.residual = if scale > 0.0 { worst / scale } else { worst };
     }

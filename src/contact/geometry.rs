@@ -39,8 +39,9 @@ pub struct Geometry {
 /// where they are looked up in [`Geometry`] for each end.
 #[derive(Clone, Copy)]
 pub(crate) struct Directions<'a> {
-    normals: &'a [Vec2],
-    angles: &'a [f64],
+    pub(super) normals: &'a [Vec2],
+    /// Of the opposite of the normals.
+    pub(super) angles: &'a [f64],
 }
 
 impl Directions<'_> {

@@ -4,10 +4,10 @@ use super::bulges::Bulges;
 use super::complementarity::Offence;
 use super::error::ContactError;
 use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry};
+use super::matrix::{ContactMatrix, Geometry, Precision};
 use super::patch::Patch;
 use super::present::{Present, name_of};
-use super::product::Products;
+use super::product::FirstProducts;
 use super::search::Search;
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
@@ -86,10 +86,12 @@ pub struct ContactLaw {
     /// The neighbour list without `pairs`, and whether it is up to date.
     pub(super) others: Vec<[u32; 2]>,
     pub(super) parted: bool,
+    /// What the first residual of this solution is computed in.
+    pub(super) precision: Precision,
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
     pub(super) slack: f64,
     pub(super) image: Vec<f64>,
-    pub(super) products: Products<f64>,
+    pub(super) products: FirstProducts,
     pub(super) bulges: Bulges,
     /// The largest bulge that the neighbour list is known to cover at the present positions.
     pub(super) covered: f64,
@@ -130,6 +132,8 @@ pub struct Work {
     pub patch_iterations: u64,
     /// Geometries computed of all contacts; after an exchange only that of new ones is.
     pub assemblies: u64,
+    /// Those of which entries were computed in single precision, which is enough far from balance.
+    pub singles: u64,
     /// Structures of the contact set (lists, places in `A`) built.
     pub structures: u64,
     /// Matrices whose entries were kept in double precision; far above round-off their products with the forces are enough.
@@ -180,9 +184,10 @@ impl ContactLaw {
             present: OnceLock::new(),
             others: Vec::new(),
             parted: false,
+            precision: Precision::Double,
             slack: 0.0,
             image: Vec::new(),
-            products: Products::default(),
+            products: FirstProducts::default(),
             bulges: Bulges::default(),
             covered: 0.0,
             tolerated: 0.0,
@@ -371,7 +376,7 @@ impl ContactLaw {
         match self.rule {
             Rule::Complementarity => self.settle(packing)?,
             Rule::Seed => {
-                self.slack = 0.0;
+                (self.slack, self.precision) = (0.0, Precision::Double);
                 self.sweep(packing)?;
                 self.exchange(packing, self.offending.len());
                 self.sweep(packing)?;
@@ -414,6 +419,13 @@ impl ContactLaw {
             }
             Rule::Seed => self.tolerance,
         }
+    }
+
+    /// How far contours of a pair without a force may overlap (length). Far from balance it is half of what is accepted, so that
+    /// `f_max` may fall by half in a step before its promise is broken.
+    pub(super) fn passed_over(&self, scale: f64) -> f64 {
+        let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
+        part * ACCEPTED * self.allowed(scale)
     }
 
     /// The residual looked for, as a length; `scale` is the largest `|δ|`.

@@ -6,6 +6,7 @@ use super::blocks::{Run, pairs_of};
 use super::list::ContactList;
 use super::product::{Number, Products, product, product_of_blocks};
 use super::refresh::Room;
+use super::sight::Sight;
 use crate::packing::Packing;
 use crate::wide::wide;
 use core::ops::Range;
@@ -64,6 +65,10 @@ pub struct ContactMatrix {
     pub(super) keeps_values: bool,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
     pub(super) scaled: Vec<f32>,
+    /// What entries in single precision are made from, and multiplied with in the first place: see [`sight`](super::sight).
+    pub(super) sights: Vec<Sight>,
+    pub(super) loads: Vec<f32>,
+    pub(super) units: Units,
     pub(super) known: Known,
     /// How often the values were kept.
     pub(super) kept: u64,
@@ -79,16 +84,37 @@ pub struct ContactMatrix {
     pub(super) changed: bool,
 }
 
+/// What entries are computed in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Precision {
+    Single,
+    #[default]
+    Double,
+}
+
 /// Which entries are of the present positions and contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Known {
     /// None: contacts have come, come to rest or woken since.
     Nothing,
-    /// Those in single precision.
-    Scaled,
+    /// Those in single precision, computed in single precision.
+    Single,
+    /// Those in single precision, rounded from double precision.
+    Rounded,
     /// All; an empty matrix lacks none.
     #[default]
     All,
+}
+
+/// What single precision counts in, so that none of its numbers is far from 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Units {
+    /// `(R_max/2πγ)^½` (length per force, to the half).
+    pub(super) root: f64,
+    /// `A_cc^½ f_c` of a force γ on the largest particles, up to a factor of order 1 (length times force, to the half).
+    pub(super) load: f64,
+    /// An estimate of the [rounding](super::sight::rounding) of what entries make of the forces.
+    pub(super) rounding: f64,
 }
 
 impl ContactMatrix {
@@ -122,6 +148,16 @@ impl ContactMatrix {
     ) {
         self.restructure(packing, contacts, geometry.duplicate(), line_tension);
         self.complete(geometry);
+    }
+
+    /// The unit of the products of [`Self::loads`] (length times force, to the half).
+    pub(crate) fn unit_of_loads(&self) -> f64 {
+        self.units.load
+    }
+
+    /// What their rounding may come to, as a part of the largest `|A_cc f|`.
+    pub(crate) fn rounding_of_loads(&self) -> f64 {
+        self.units.rounding
     }
 
     /// Whether the contacts are those that the structure was built of, in their order.

@@ -19,7 +19,6 @@ use super::complementarity::{Offence, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
 use super::patch::{GONE, NOWHERE, Patch, Whole};
-use super::tolerance::ACCEPTED;
 use crate::droplet::kernel::Direction;
 use crate::packing::{Packing, unit_and_length};
 
@@ -69,7 +68,7 @@ impl ContactLaw {
 
     fn mend_in(&mut self, packing: &Packing, patch: &mut Patch) -> bool {
         let allowed = self.allowed(self.scale());
-        let (before, tolerance) = (self.off, ACCEPTED * allowed);
+        let (before, tolerance) = (self.off, self.passed_over(self.scale()));
         let per_radius = self.per_radius();
         for _ in 0..ROUNDS {
             self.work.patches += 1;

@@ -38,6 +38,7 @@ mod present;
 pub(crate) mod product;
 mod refresh;
 mod search;
+mod sight;
 pub mod solver;
 mod tolerance;
 

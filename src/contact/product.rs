@@ -65,6 +65,22 @@ impl<F: Number> Products<F> {
     }
 }
 
+/// What the off-diagonal entries of `A` make of the forces, in either precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum First<'a> {
+    /// As a length.
+    Double(&'a [f64]),
+    /// Of `D^(−½) A D^(−½)` and `D^½ f`, in units of the matrix.
+    Single(&'a [f32]),
+}
+
+/// Room for the products with the forces.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FirstProducts {
+    pub(super) double: Products<f64>,
+    pub(super) single: Products<f32>,
+}
+
 /// `y += A x` of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each.
 #[inline(always)]
 pub(super) fn product<F: Number, const Z: usize, const T: usize>(

@@ -3,8 +3,9 @@
 use super::blocks::Run;
 use super::fill::{Blocks, fill, fill_blocks};
 use super::geometry::{Directions, Geometry, Part};
-use super::matrix::{ContactMatrix, Known};
-use super::product::{Number, Products};
+use super::matrix::{ContactMatrix, Known, Precision, Units};
+use super::product::{FirstProducts, Number, Products};
+use super::sight::{Lanes, Sight, SingleBlocks, fill_single, fill_single_blocks};
 use crate::domain::Vec2;
 use crate::droplet::kernel::Direction;
 use crate::packing::Packing;
@@ -17,6 +18,7 @@ use core::ops::Range;
 pub(super) struct Room {
     toward: Vec<Direction>,
     values: Vec<f64>,
+    lanes: Vec<Lanes>,
 }
 
 /// What blocks are made from.
@@ -27,6 +29,9 @@ struct Layout<'a> {
     end: &'a [u32],
     scale: &'a [f64],
     scaling: &'a [f64],
+    sights: &'a [Sight],
+    loads: &'a [f32],
+    units: Units,
 }
 
 /// Where the entries of blocks go, the first of all being number `first` of the matrix; the values themselves only where they are
@@ -38,27 +43,71 @@ struct Filled<'a> {
     room: &'a mut Room,
 }
 
+/// The precision that entries are computed in, and the column for their products with the forces.
+enum Column<'a> {
+    Double(&'a mut [f64]),
+    Single(&'a mut [f32]),
+}
+
 impl ContactMatrix {
     /// Directions and scaled values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
-    /// [`products_into`](Self::products_into) has it. The pairs are the contacts by number, those of `geometry`. Returns the
-    /// largest `|δ|` (length).
+    /// [`products_into`](Self::products_into) has it; entries and products in this `precision`. The pairs are the contacts by number,
+    /// those of `geometry`. Returns the largest `|δ|` (length).
     pub(crate) fn refresh(
         &mut self,
         geometry: &mut Geometry,
         at: (&Packing, &[[u32; 2]], &[f64]),
-        products: &mut Products<f64>,
+        products: &mut FirstProducts,
+        precision: Precision,
     ) -> f64 {
-        self.known = if self.keeps_values {
-            self.kept += 1;
-            Known::All
-        } else {
-            Known::Scaled
+        self.known = match precision {
+            Precision::Single => Known::Single,
+            Precision::Double if self.keeps_values => Known::All,
+            Precision::Double => Known::Rounded,
         };
-        if self.is_for_two() {
-            self.refresh_by_two(geometry, at, products)
-        } else {
-            self.refresh_by_one(geometry, at, products.alone(self.len()))
+        self.kept += u64::from(self.is_complete());
+        let n = self.len();
+        match (precision, self.is_for_two()) {
+            (Precision::Single, false) => {
+                let column = Column::Single(products.single.alone(n));
+                self.refresh_by_one(geometry, at, column)
+            }
+            (Precision::Double, false) => {
+                let column = Column::Double(products.double.alone(n));
+                self.refresh_by_one(geometry, at, column)
+            }
+            (Precision::Single, true) => {
+                let columns = products.single.both(n).map(Column::Single);
+                let largest = self.refresh_by_two(geometry, at, columns);
+                products.single.add_up();
+                largest
+            }
+            (Precision::Double, true) => {
+                let columns = products.double.both(n).map(Column::Double);
+                let largest = self.refresh_by_two(geometry, at, columns);
+                products.double.add_up();
+                largest
+            }
         }
+    }
+
+    /// The entries in single precision of the directions of `geometry`, and their products with `forces`.
+    pub(crate) fn fill_in_single(
+        &mut self,
+        geometry: &Geometry,
+        forces: &[f64],
+        products: &mut FirstProducts,
+    ) {
+        let (contacts, runs) = (self.len(), self.runs.len());
+        let mut column = Column::Single(products.single.alone(contacts));
+        wide(
+            #[inline(always)]
+            || {
+                self.look(geometry, forces, 0..contacts);
+                self.fill((geometry.directions(), forces), 0..runs, &mut column, false);
+            },
+        );
+        self.known = Known::Single;
     }
 
     /// Values and scaled values of the directions of `geometry`, where they are not there.
@@ -67,11 +116,12 @@ impl ContactMatrix {
             return;
         }
         let zeros = vec![0.0; self.len()];
-        let products = &mut vec![0.0; self.len()];
+        let mut products = vec![0.0; self.len()];
+        let column = &mut Column::Double(&mut products);
         let all = 0..self.runs.len();
         wide(
             #[inline(always)]
-            || self.fill((geometry.directions(), &zeros), all, products, true),
+            || self.fill((geometry.directions(), &zeros), all, column, true),
         );
         self.known = Known::All;
         self.kept += 1;
@@ -112,30 +162,34 @@ impl ContactMatrix {
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
-        products: &mut [f64],
+        mut column: Column<'_>,
     ) -> f64 {
         let (sorted, keep) = (self.sorted_contacts(), self.keeps_values);
+        let in_single = matches!(column, Column::Single(_));
         let stretches = core::mem::take(&mut self.stretches);
         let largest = wide(
             #[inline(always)]
             || {
-                let late = sorted..pairs.len();
-                let part = geometry.part(late.clone());
-                part.refresh(packing, &pairs[late.clone()]);
-                let mut largest = self.largest_overlap(geometry, late);
+                let mut largest: f64 = 0.0;
                 let [mut run, mut contact] = [0; 2];
-                for &[runs, contacts] in &stretches {
-                    let own = contact..contacts;
+                let late = ([0; 2], sorted..pairs.len());
+                let ends = stretches.iter().map(|&[runs, contacts]| {
+                    let own = core::mem::replace(&mut contact, contacts)..contacts;
+                    ([core::mem::replace(&mut run, runs), runs], own)
+                });
+                for (runs, own) in core::iter::once(late).chain(ends) {
                     let part = geometry.part(own.clone());
                     part.refresh(packing, &pairs[own.clone()]);
-                    largest = largest.max(self.largest_overlap(geometry, own));
+                    largest = largest.max(self.largest_overlap(geometry, own.clone()));
+                    if in_single {
+                        self.look(geometry, forces, own);
+                    }
                     let at = (geometry.directions(), forces);
-                    self.fill(at, run..runs, products, keep);
-                    [run, contact] = [runs, contacts];
+                    self.fill(at, runs[0]..runs[1], &mut column, keep);
                 }
                 let all = self.runs.len();
                 let at = (geometry.directions(), forces);
-                self.fill(at, run..all, products, keep);
+                self.fill(at, self.sorted..all, &mut column, keep);
                 largest
             },
         );
@@ -143,12 +197,43 @@ impl ContactMatrix {
         largest
     }
 
+    /// What single precision knows of some contacts.
+    #[inline(always)]
+    fn look(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
+        let seen = Seen {
+            sights: &mut self.sights[contacts.clone()],
+            loads: &mut self.loads[contacts.clone()],
+        };
+        let of = [&self.diagonal[..], &self.scaling, forces];
+        seen.look(geometry.directions(), of, contacts, self.units);
+    }
+
+    /// [`look`](Self::look) at all contacts, the first `half` of them and the others.
+    fn look_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
+        let (of, units) = ([&self.diagonal[..], &self.scaling, forces], self.units);
+        let (sights, more_sights) = self.sights.split_at_mut(half);
+        let (loads, more_loads) = self.loads.split_at_mut(half);
+        let look = |seen: Seen<'_>, contacts: Range<usize>| {
+            wide(
+                #[inline(always)]
+                || seen.look(geometry.directions(), of, contacts, units),
+            );
+        };
+        let one = Seen { sights, loads };
+        let other = Seen {
+            sights: more_sights,
+            loads: more_loads,
+        };
+        let all = of[0].len();
+        both(true, || look(one, 0..half), || look(other, half..all));
+    }
+
     /// Half of the directions each, then half of the entries each.
     fn refresh_by_two(
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
-        products: &mut Products<f64>,
+        [mut column, mut more]: [Column<'_>; 2],
     ) -> f64 {
         let refresh = |part: Part<'_>, pairs: &[[u32; 2]]| {
             wide(
@@ -164,21 +249,22 @@ impl ContactMatrix {
             || refresh(other, &pairs[half..]),
         );
         let (middle, all, length) = (self.middle(), self.runs.len(), self.len());
+        if matches!(column, Column::Single(_)) {
+            self.look_by_two(geometry, forces, half);
+        }
         let keep = self.keeps_values;
         let (layout, [mut one, mut other]) = self.halves(middle, keep);
-        let fill = |runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f64]| {
+        let fill = |runs: Range<usize>, out: &mut Filled<'_>, column: &mut Column<'_>| {
             wide(
                 #[inline(always)]
-                || layout.fill((geometry.directions(), forces), runs, out, products),
+                || layout.fill((geometry.directions(), forces), runs, out, column),
             );
         };
-        let [y, more] = products.both(length);
         both(
             true,
-            || fill(0..middle, &mut one, y),
-            || fill(middle..all, &mut other, more),
+            || fill(0..middle, &mut one, &mut column),
+            || fill(middle..all, &mut other, &mut more),
         );
-        products.add_up();
         wide(
             #[inline(always)]
             || self.largest_overlap(geometry, 0..length),
@@ -201,6 +287,9 @@ impl ContactMatrix {
             end: &self.end,
             scale: &self.scale,
             scaling: &self.scaling,
+            sights: &self.sights,
+            loads: &self.loads,
+            units: self.units,
         };
         let (scaled, more_scaled) = self.scaled.split_at_mut(first);
         let (value, more_values) = keep.then(|| self.value.split_at_mut(first)).unzip();
@@ -226,12 +315,12 @@ impl ContactMatrix {
         &mut self,
         at: (Directions<'_>, &[f64]),
         runs: Range<usize>,
-        products: &mut [f64],
+        column: &mut Column<'_>,
         keep: bool,
     ) {
         let all = self.runs.len();
         let (layout, [mut all, _]) = self.halves(all, keep);
-        layout.fill(at, runs, &mut all, products);
+        layout.fill(at, runs, &mut all, column);
     }
 
     /// The largest `|δ|` (length) of some contacts, leaving out those at rest.
@@ -252,17 +341,63 @@ impl ContactMatrix {
     }
 }
 
+/// Columns of what single precision knows of some contacts.
+struct Seen<'a> {
+    sights: &'a mut [Sight],
+    loads: &'a mut [f32],
+}
+
+impl Seen<'_> {
+    /// From the directions of the `contacts`, and the columns of diagonal, scaling and forces of all.
+    #[inline(always)]
+    fn look(
+        self,
+        Directions { normals, angles }: Directions<'_>,
+        of: [&[f64]; 3],
+        contacts: Range<usize>,
+        units: Units,
+    ) {
+        let [diagonal, scaling, forces] = of.map(
+            #[inline(always)]
+            |column| &column[contacts.clone()],
+        );
+        let inverse = 1.0 / units.load;
+        let columns = self.loads.iter_mut().zip(diagonal);
+        for ((load, a), (s, f)) in columns.zip(scaling.iter().zip(forces)) {
+            *load = (f * (a * s * inverse)) as f32;
+        }
+        let directions = normals[contacts.clone()].iter().zip(&angles[contacts]);
+        for ((sight, s), (n, angle)) in self.sights.iter_mut().zip(scaling).zip(directions) {
+            *sight = Sight::of((-n.x, -n.y), *angle, s * units.root);
+        }
+    }
+}
+
 impl Layout<'_> {
     /// The entries of some runs, and their products with the forces.
     #[inline(always)]
     fn fill(
+        self,
+        at: (Directions<'_>, &[f64]),
+        runs: Range<usize>,
+        out: &mut Filled<'_>,
+        column: &mut Column<'_>,
+    ) {
+        match column {
+            Column::Double(products) => self.fill_in_double(at, runs, out, products),
+            Column::Single(products) => self.fill_in_single(runs, out, products),
+        }
+    }
+
+    #[inline(always)]
+    fn fill_in_double(
         self,
         (directions, forces): (Directions<'_>, &[f64]),
         runs: Range<usize>,
         out: &mut Filled<'_>,
         products: &mut [f64],
     ) {
-        let Room { toward, values } = &mut *out.room;
+        let Room { toward, values, .. } = &mut *out.room;
         for run in &self.runs[runs] {
             let ends = &self.end[run.ends()];
             // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
@@ -299,6 +434,36 @@ impl Layout<'_> {
                 6 => fill::<6, 15>(blocks, scales),
                 7 => fill::<7, 21>(blocks, scales),
                 z => fill_blocks(z, blocks, scales),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn fill_in_single(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
+        let per_radius = 1.0 / (self.units.root * self.units.root);
+        for run in &self.runs[runs] {
+            let own = run.values().start - out.first..run.values().end - out.first;
+            let blocks = SingleBlocks {
+                ends: &self.end[run.ends()],
+                sights: self.sights,
+                loads: self.loads,
+                scaled: &mut out.scaled[own],
+                products,
+                room: &mut out.room.lanes,
+            };
+            let particles = &self.particle[run.block..run.block + run.count];
+            let radii = particles
+                .iter()
+                .map(|p| (self.scale[*p as usize] * per_radius) as f32);
+            match run.size {
+                1 => {}
+                2 => fill_single::<2, 1>(blocks, radii),
+                3 => fill_single::<3, 3>(blocks, radii),
+                4 => fill_single::<4, 6>(blocks, radii),
+                5 => fill_single::<5, 10>(blocks, radii),
+                6 => fill_single::<6, 15>(blocks, radii),
+                7 => fill_single::<7, 21>(blocks, radii),
+                z => fill_single_blocks(z, blocks, radii),
             }
         }
     }

@@ -161,7 +161,7 @@ def promised(recording, f_max, scale):
     """The residual that a frame keeps to, relative to max |delta|: 16 tolerances; looser far from balance, f_max in units of gamma."""
     tolerance = recording.tolerance
     if f_max > recording.threshold and not recording.seed_rule and scale > 0:
-        tolerance = max(tolerance, min(1e-4, 1e-2 * f_max * 1.5 / np.pi * recording.radii.min() / scale))
+        tolerance = max(tolerance, min(3e-4, 1e-2 * f_max * 1.5 / np.pi * recording.radii.min() / scale))
     return max(16 * tolerance, 1e-9)
 
 

@@ -3,7 +3,7 @@
 use super::SolverError;
 use super::single::Single;
 use crate::contact::matrix::ContactMatrix;
-use crate::contact::product::Products;
+use crate::contact::product::{First, Products};
 use crate::wide::wide;
 
 /// Conjugate gradients with the diagonal as preconditioner; owns its vectors, so a solve allocates nothing once they are
@@ -78,25 +78,36 @@ impl ConjugateGradient {
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
     /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
     /// above round-off: that saves a product with the matrix. So do `products`, those of its off-diagonal entries with the
-    /// `forces`, where they are at hand. What [needs values](Progress::NeedsValues) goes on here with the `iterations` it had.
+    /// `forces`, where they are at hand; those in single precision count with an estimate of their rounding. What
+    /// [needs values](Progress::NeedsValues) goes on here with the `iterations` it had.
     pub(crate) fn begin(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
         (tolerance, loosely): (f64, bool),
-        (mut products, mut iterations): (Option<&[f64]>, usize),
+        (mut products, mut iterations): (Option<First<'_>>, usize),
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
         self.single.prepare(matrix.len());
         loop {
-            let before = self.largest;
+            let (before, mut rounding) = (self.largest, 0.0);
             self.largest = match products.take() {
-                Some(products) => self.residual_of(matrix, (overlaps, forces, products)),
+                Some(First::Double(q)) => self.residual_of(matrix, (overlaps, forces, q), 1.0).0,
+                Some(First::Single(q)) => {
+                    let unit = matrix.unit_of_loads();
+                    let (largest, load) = self.residual_of(matrix, (overlaps, forces, q), unit);
+                    rounding = matrix.rounding_of_loads() * load;
+                    if !largest.is_finite() {
+                        return Ok(Progress::NeedsValues(iterations));
+                    }
+                    largest
+                }
                 None if !matrix.is_complete() => return Ok(Progress::NeedsValues(iterations)),
                 None => self.true_residual(matrix, overlaps, forces),
             };
-            if self.largest <= tolerance {
+            if self.largest + rounding <= tolerance {
+                self.largest += rounding;
                 return Ok(Progress::Done(iterations));
             }
             if !self.largest.is_finite() {
@@ -111,8 +122,8 @@ impl ConjugateGradient {
                 return Ok(Progress::NeedsWhole(iterations));
             };
             iterations += more;
-            if loosely && bound <= tolerance {
-                self.largest = bound;
+            if loosely && bound + rounding <= tolerance {
+                self.largest = bound + rounding;
                 return Ok(Progress::Done(iterations));
             }
         }
@@ -165,23 +176,26 @@ impl ConjugateGradient {
     /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); contacts at rest have none.
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
         matrix.off_diagonal_products(forces, &mut self.image);
-        let columns = (overlaps, forces, self.image.sums());
-        let largest = wide(
-            #[inline(always)]
-            || subtract(&mut self.residual, matrix, columns),
-        );
-        self.scaled = largest[1];
-        largest[0]
+        let image = core::mem::take(&mut self.image);
+        let largest = self.residual_of(matrix, (overlaps, forces, image.sums()), 1.0);
+        self.image = image;
+        largest.0
     }
 
-    /// [`true_residual`](Self::true_residual) with the products of the off-diagonal entries given.
-    fn residual_of(&mut self, matrix: &ContactMatrix, columns: (&[f64], &[f64], &[f64])) -> f64 {
-        let largest = wide(
+    /// [`true_residual`](Self::true_residual) with the products of the off-diagonal entries given, in units of `unit`; and the largest
+    /// `|A_cc f|`.
+    fn residual_of<Q: Product>(
+        &mut self,
+        matrix: &ContactMatrix,
+        columns: (&[f64], &[f64], &[Q]),
+        unit: f64,
+    ) -> (f64, f64) {
+        let [largest, scaled, load] = wide(
             #[inline(always)]
-            || subtract(&mut self.residual, matrix, columns),
+            || subtract(&mut self.residual, matrix, columns, unit),
         );
-        self.scaled = largest[1];
-        largest[0]
+        self.scaled = scaled;
+        (largest, load)
     }
 
     /// Iterates from the residual at hand until the recurrence's residual meets the tolerance.
@@ -246,17 +260,38 @@ impl ConjugateGradient {
     }
 }
 
-/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest `|r|` and the
-/// largest `|D^(−½) r|`, NaN if any is.
+/// A product of the off-diagonal entries in a row.
+trait Product: Copy {
+    /// As a length, in a row with this diagonal and scaling.
+    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64;
+}
+
+impl Product for f64 {
+    #[inline(always)]
+    fn length(self, _: f64, _: f64, _: f64) -> f64 {
+        self
+    }
+}
+
+impl Product for f32 {
+    #[inline(always)]
+    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64 {
+        f64::from(self) * (unit * (diagonal * scaling))
+    }
+}
+
+/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest `|r|`,
+/// `|D^(−½) r|` and `|A_cc f|`, NaN if any is.
 #[inline(always)]
-fn subtract(
+fn subtract<Q: Product>(
     residual: &mut [f64],
     matrix: &ContactMatrix,
-    (overlaps, forces, products): (&[f64], &[f64], &[f64]),
-) -> [f64; 2] {
+    (overlaps, forces, products): (&[f64], &[f64], &[Q]),
+    unit: f64,
+) -> [f64; 3] {
     let larger = |m: f64, x: f64| if x > m || x.is_nan() { x } else { m };
-    let left = |d: f64, f: f64, q: f64, a: f64, s: f64| {
-        let r = d - (a * f + q);
+    let left = |d: f64, af: f64, q: Q, a: f64, s: f64| {
+        let r = d - (af + q.length(a, s, unit));
         if s > 0.0 { r } else { 0.0 }
     };
     let (r8, r_rest) = residual.as_chunks_mut::<8>();
@@ -265,23 +300,28 @@ fn subtract(
     let (q8, q_rest) = products.as_chunks::<8>();
     let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
     let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
-    let (mut largest, mut scaled) = ([0.0; 8], [0.0; 8]);
+    let (mut largest, mut scaled, mut load) = ([0.0; 8], [0.0; 8], [0.0; 8]);
     let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(q8));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
-            r[k] = left(d[k], f[k], q[k], a[k], s[k]);
+            let af = a[k] * f[k];
+            r[k] = left(d[k], af, q[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
             scaled[k] = larger(scaled[k], (r[k] * s[k]).abs());
+            load[k] = larger(load[k], af.abs());
         }
     }
-    let mut most = [largest, scaled].map(
+    let mut most = [largest, scaled, load].map(
         #[inline(always)]
         |most| most.into_iter().fold(0.0, larger),
     );
     let rows = r_rest.iter_mut().zip(d_rest).zip(f_rest.iter().zip(q_rest));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a_rest.iter().zip(s_rest)) {
-        *r = left(*d, *f, *q, *a, *s);
-        most = [larger(most[0], r.abs()), larger(most[1], (*r * s).abs())];
+        let af = a * f;
+        *r = left(*d, af, *q, *a, *s);
+        most[0] = larger(most[0], r.abs());
+        most[1] = larger(most[1], (*r * s).abs());
+        most[2] = larger(most[2], af.abs());
     }
     most
 }
