@@ -202,9 +202,6 @@ impl ContactLaw {
             self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
             (self.structured, self.refreshed) = (true, true);
-        } else {
-            let all = 0..self.matrix.len();
-            self.scale = self.matrix.largest_overlap(&self.geometry, all);
         }
         anew
     }
@@ -411,17 +408,20 @@ impl ContactLaw {
     pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
         debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
         let mut came: Vec<([u32; 2], f64)> = Vec::new();
+        let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
         for at in 0..count {
             let offence = self.offending[at];
             self.note(offence.pair(), matches!(offence, Offence::Add(..)));
             match offence {
                 Offence::Drop(contact, _) => {
+                    left = left.max(self.geometry.overlaps()[contact].abs());
                     self.forces[contact] = 0.0;
                     self.at_rest.push(contact as u32);
                     self.matrix.set_at_rest(contact, true);
                 }
                 Offence::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
                     Some(contact) => {
+                        joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
                         self.forces[contact as usize] = guess;
                         self.at_rest.retain(|c| *c != contact);
                         self.matrix.set_at_rest(contact as usize, false);
@@ -441,9 +441,15 @@ impl ContactLaw {
             self.forces.push(guess);
             self.added.push(pair);
             self.geometry.add(packing, pair);
+            joined = joined.max(self.geometry.overlaps()[self.pairs.len() - 1].abs());
             let duplicate = self.geometry.duplicate();
             self.matrix.add(packing, duplicate, pair, self.line_tension);
         }
+        if left >= self.scale {
+            let all = 0..self.matrix.len();
+            self.scale = self.matrix.largest_overlap(&self.geometry, all);
+        }
+        self.scale = self.scale.max(joined);
         if self.is_in_order() {
             self.matrix.make_whole();
         }
