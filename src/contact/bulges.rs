@@ -127,8 +127,9 @@ impl Bulges {
         }
     }
 
-    /// Narrows the bounds that are above `widest`, or no numbers, to what `exact` says of the particle, and that to `widest`;
-    /// returns the first particle of which it says more, with what it says. The next bounds are summed anew.
+    /// Narrows all bounds to what `exact` says of the particles, and that to `widest`: a particle that may bulge farther has no bound
+    /// any more, so that of another decides which pairs are looked at, and must not depend on how it has grown. Returns the first
+    /// particle of which `exact` says more than `widest`, with what it says. The next bounds are summed anew.
     pub(super) fn cut(
         &mut self,
         widest: f64,
@@ -136,9 +137,6 @@ impl Bulges {
     ) -> Option<(usize, f64)> {
         let mut first = None;
         for (particle, bound) in self.bound.iter_mut().enumerate() {
-            if *bound <= widest {
-                continue;
-            }
             *bound = exact(particle);
             if bound.is_nan() || *bound > widest {
                 first.get_or_insert((particle, *bound));
@@ -212,5 +210,36 @@ mod tests {
         let exact = |p| if p < 3 { 0.9 } else { 1.5 };
         assert_eq!(bulges.cut(1.0, exact), Some((3, 1.5)));
         assert_eq!(bulges.largest(), 1.0);
+    }
+
+    #[test]
+    fn bounds_that_are_cut_do_not_know_how_they_have_grown() {
+        let radii = [0.5; 30];
+        let pairs: Vec<[u32; 2]> = (0..29).map(|p| [p, p + 1]).collect();
+        let forces = |step: u32| -> Vec<f64> {
+            let wave = |c: usize| 0.2 + 0.1 * libm::sin(1.3 * c as f64 + 0.2 * f64::from(step));
+            (0..29).map(wave).collect()
+        };
+        let mut absurd = forces(40);
+        absurd[7] = 1e3;
+        let exact = |p: usize| {
+            let own = [p.checked_sub(1), (p < 29).then_some(p)];
+            let sum: f64 = own.into_iter().flatten().map(|c| most_of(absurd[c])).sum();
+            sum * 0.5 * 0.16
+        };
+        let cut = |first: u32| {
+            let mut bulges = Bulges::default();
+            for step in first..40 {
+                bulges.bound(&pairs, &forces(step), &radii, 0.16);
+            }
+            bulges.bound(&pairs, &absurd, &radii, 0.16);
+            let grown: Vec<f64> = (0..30).map(|p| bulges.of(p)).collect();
+            assert_eq!(bulges.cut(2.5, exact).map(|c| c.0), Some(7));
+            let cut: Vec<f64> = (0..30).map(|p| bulges.of(p)).collect();
+            (grown, cut)
+        };
+        let ((long, a), (short, b)) = (cut(0), cut(39));
+        assert_ne!(long, short, "they have grown in different ways");
+        assert_eq!(a, b);
     }
 }

@@ -17,7 +17,8 @@
 //! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over. Their
 //! gaps are positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too
-//! wide (`bulges.rs`), cannot change a bit of the answer.
+//! wide (`bulges.rs`), cannot change a bit of the answer. The forces of an unfinished exchange can be absurd, and bulges as wide as
+//! many particles; they are cut short, and then all bounds are the exact sums.
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 

@@ -387,6 +387,10 @@ impl ContactLaw {
 
     /// Solves on at the positions solved last, to the tolerance that is due at `f_max` (units of γ).
     pub(crate) fn tighten(&mut self, packing: &Packing, f_max: f64) -> Result<(), ContactError> {
+        if self.rule == Rule::Seed {
+            // It solves twice and takes what comes.
+            return Ok(());
+        }
         self.present.take();
         self.slack = slack(packing, f_max);
         self.settle(packing)?;
@@ -421,8 +425,8 @@ impl ContactLaw {
         }
     }
 
-    /// How far contours of a pair without a force may overlap (length). Far from balance it is half of what is accepted, so that
-    /// `f_max` may fall by half in a step before its promise is broken.
+    /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
+    /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
     pub(super) fn passed_over(&self, scale: f64) -> f64 {
         let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
         part * ACCEPTED * self.allowed(scale)

@@ -1,6 +1,6 @@
 //! The entries of `A` in single precision, straight from what single precision knows of the contacts.
 //!
-//! Far from balance the forces of a step are solved for to a ten-thousandth, and entries in double precision would only be rounded.
+//! Far from balance the forces of a step are solved for to a few digits, and entries in double precision would only be rounded.
 //! What an entry takes of a contact goes into sixteen bytes: its direction seen from the lower particle, its angle in parts of the whole
 //! turn, and the scaling. Angles that wrap need no branch, differ exactly, and the direction seen from the other
 //! particle is the same number with three bits turned over.

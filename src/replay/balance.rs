@@ -109,8 +109,10 @@ pub struct Balance {
 /// How far a residual may always be from zero: round-off, and the full tolerance amplified by a matrix of condition 6.
 const ALLOWED: f64 = 1e-9;
 
-/// How much larger a residual of forces may be than one of lengths: the condition number of `A` is about 6.
-const AMPLIFIED: f64 = 8.0;
+/// How much larger a residual of forces may be than one of lengths, among particles of one size: the condition number of `A` is
+/// about 6. The largest overlap is that of large particles; between small ones, whose contacts are stiffer, the same length stands for
+/// a force that is larger by the ratio of sizes.
+const AMPLIFIED: f64 = 6.0;
 
 impl Balance {
     /// Nothing seen yet of a recording of `scene`.
@@ -199,10 +201,11 @@ impl Balance {
             0.0
         };
         let promised = ACCEPTED * due_tolerance(packing, overlaps, due, self.tolerance);
+        let ratio = packing.largest_radius() / packing.smallest_radius();
         Allowed {
             step,
             lengths: promised.max(ALLOWED),
-            forces: (AMPLIFIED * promised).max(ALLOWED),
+            forces: (AMPLIFIED * ratio * promised).max(ALLOWED),
         }
     }
 

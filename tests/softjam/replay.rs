@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::files::{open, record_as, states};
-use softjam::force::Form;
+use softjam::force::{Form, METRICS};
 use softjam::frame::Frame;
 use softjam::record::{Format, Snapshot};
 use softjam::relax::Relaxation;
@@ -10,7 +10,7 @@ use softjam::relax::newton::Turns;
 use softjam::replay::{
     Balance, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
 };
-use softjam::scene::{Channels, Minimizer, Scene, Schedule};
+use softjam::scene::{Channels, Minimizer, Radii, Scene, Schedule, Species};
 
 fn scene() -> Scene {
     Scene {
@@ -183,6 +183,31 @@ fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
         assert_eq!(found[0], found[1]);
         assert_eq!(found[0], found[2]);
     }
+}
+
+#[test]
+fn frames_of_large_and_small_particles_are_in_balance() {
+    // A length that hardly matters between large particles is a strong force between small ones.
+    let species = |radius: f64, fraction: f64| Species { radius, fraction };
+    let scene = Scene {
+        particles: 600,
+        phi: 1.0,
+        seed: 4,
+        radii: Radii::Species(vec![species(0.5, 0.8), species(10.0, 0.2)]),
+        ..Scene::default()
+    };
+    let mut run = Relaxation::new(&scene).expect("a packing");
+    let mut balance = Balance::new(&scene);
+    for _ in 0..60 {
+        run.advance().expect("a step");
+        let metrics: Vec<_> = METRICS
+            .into_iter()
+            .zip(run.observables().metrics())
+            .collect();
+        balance.check(run.packing(), &run.frame(), &metrics);
+    }
+    assert_eq!(balance.frames, 60);
+    assert!(balance.agrees(), "{balance:?}");
 }
 
 #[test]
