@@ -281,7 +281,7 @@ fn size(table: &Table) -> String {
         title: "d  Cost of a step".into(),
         x: Axis::log("particles N", (10.0, 1e5)),
         y: Axis::log("µs per step and particle", y),
-        legend: (0.04, 0.70),
+        legend: (0.04, 0.60),
         notes: Vec::new(),
         series,
     }
