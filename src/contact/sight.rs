@@ -6,6 +6,7 @@
 //! particle is the same number with three bits turned over.
 
 use super::product::product_of_blocks;
+use crate::droplet::kernel::ROUND;
 use crate::packing::Packing;
 use core::f64::consts::PI;
 
@@ -25,11 +26,9 @@ const TOP: u32 = 1 << 31;
 /// What the opposite direction has turned over.
 const SEEN_FROM: [[u32; 4]; 2] = [[0; 4], [TOP, TOP, TOP, 0]];
 
-/// 1.5·2⁵²: a small number added to it is rounded to a whole one, which stands in the last bits of the sum.
-const ROUND: f64 = 6_755_399_441_055_744.0;
-
 impl Sight {
-    /// Of a contact whose direction, from the lower particle to the higher, has the components `(x, y)` and this `angle`.
+    /// Of a contact whose direction, from the lower particle to the higher, has the components `(x, y)` and this `angle` (radians,
+    /// −π to π), and whose scaling is `weight`.
     #[inline(always)]
     pub(super) fn of((x, y): (f64, f64), angle: f64, weight: f64) -> Self {
         Self([

@@ -65,7 +65,7 @@ impl Angles {
 }
 
 /// 1.5·2⁵²: a small number added to it is rounded to a whole one, which stands in the last bits of the sum.
-const ROUND: f64 = 6_755_399_441_055_744.0;
+pub(crate) const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// The number of the node nearest to the smaller component, in the last six bits.
 #[inline(always)]

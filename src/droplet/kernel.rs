@@ -17,7 +17,7 @@
 //! with the Fourier series `g(θ) = −Σ_{m ≥ 2} 2/(m² − 1) cos mθ`. The derivation is in D. C. Morse and T. A. Witten,
 //! EPL 22, 549 (1993), and F. F. Dunne et al., Phil. Mag. 99, 2303 (2019); the tests below check it independently.
 
-pub(crate) use super::angle::Angles;
+pub(crate) use super::angle::{Angles, ROUND};
 use core::f64::consts::PI;
 
 /// `g(0)`: the dent under the contact itself.
