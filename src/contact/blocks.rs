@@ -1,7 +1,7 @@
 //! Where the blocks of a [`ContactMatrix`] are, and how contacts come and go without a new structure.
 
 use super::list::{ContactList, DuplicateContactList};
-use super::matrix::{ContactMatrix, Geometry, Known, Units};
+use super::matrix::{ContactMatrix, Geometry, Units};
 use super::sight::{Sight, rounding};
 use crate::droplet::kernel::G_AT_CONTACT;
 use crate::packing::Packing;
@@ -100,7 +100,7 @@ impl ContactMatrix {
 
     /// Places for the blocks.
     fn lay_out(&mut self, duplicate: &DuplicateContactList) {
-        (self.changed, self.known) = (false, Known::Nothing);
+        (self.changed, self.lacks_values) = (false, true);
         self.sort_blocks(duplicate);
         self.block_of.clear();
         self.block_of.resize(duplicate.particles(), NO_BLOCK);
@@ -157,7 +157,7 @@ impl ContactMatrix {
             self.scaled.resize(run.values().end, 0.0);
             self.runs.push(run);
         }
-        self.known = Known::Nothing;
+        self.lacks_values = true;
     }
 
     /// The run that the block of particle `p` is in, and its place there.
@@ -193,7 +193,7 @@ impl ContactMatrix {
 
     /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
     pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
-        (self.changed, self.known) = (true, Known::Nothing);
+        (self.changed, self.lacks_values) = (true, true);
         self.scaling[c] = if at_rest {
             0.0
         } else {

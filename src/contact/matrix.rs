@@ -69,7 +69,8 @@ pub struct ContactMatrix {
     pub(super) sights: Vec<Sight>,
     pub(super) loads: Vec<f32>,
     pub(super) units: Units,
-    pub(super) known: Known,
+    /// Whether the values are not those of the present positions and contacts; an empty matrix lacks none.
+    pub(super) lacks_values: bool,
     /// How often the values were kept.
     pub(super) kept: u64,
     /// Room for a run, in each of two threads.
@@ -90,20 +91,6 @@ pub(crate) enum Precision {
     Single,
     #[default]
     Double,
-}
-
-/// Which entries are of the present positions and contacts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Known {
-    /// None: contacts have come, come to rest or woken since.
-    Nothing,
-    /// Those in single precision, computed in single precision.
-    Single,
-    /// Those in single precision, rounded from double precision.
-    Rounded,
-    /// All; an empty matrix lacks none.
-    #[default]
-    All,
 }
 
 /// What single precision counts in, so that none of its numbers is far from 1.

@@ -3,7 +3,7 @@
 use super::blocks::Run;
 use super::fill::{Blocks, fill, fill_blocks};
 use super::geometry::{Directions, Geometry, Part};
-use super::matrix::{ContactMatrix, Known, Precision, Units};
+use super::matrix::{ContactMatrix, Precision, Units};
 use super::product::{FirstProducts, Number, Products};
 use super::sight::{Lanes, Sight, SingleBlocks, fill_single, fill_single_blocks};
 use crate::domain::Vec2;
@@ -60,11 +60,7 @@ impl ContactMatrix {
         products: &mut FirstProducts,
         precision: Precision,
     ) -> f64 {
-        self.known = match precision {
-            Precision::Single => Known::Single,
-            Precision::Double if self.keeps_values => Known::All,
-            Precision::Double => Known::Rounded,
-        };
+        self.lacks_values = precision == Precision::Single || !self.keeps_values;
         self.kept += u64::from(self.is_complete());
         let n = self.len();
         match (precision, self.is_for_two()) {
@@ -107,7 +103,7 @@ impl ContactMatrix {
                 self.fill((geometry.directions(), forces), 0..runs, &mut column, false);
             },
         );
-        self.known = Known::Single;
+        self.lacks_values = true;
     }
 
     /// Values and scaled values of the directions of `geometry`, where they are not there.
@@ -123,13 +119,13 @@ impl ContactMatrix {
             #[inline(always)]
             || self.fill((geometry.directions(), &zeros), all, column, true),
         );
-        self.known = Known::All;
+        self.lacks_values = false;
         self.kept += 1;
     }
 
     /// Whether all values are of the present positions and contacts.
     pub(crate) fn is_complete(&self) -> bool {
-        self.known == Known::All
+        !self.lacks_values
     }
 
     /// [`add_products`](Self::add_products) to zeros, by two threads if there are two.
