@@ -13,6 +13,8 @@
 )]
 
 mod common;
+#[cfg(feature = "recording")]
+mod damage;
 #[cfg(feature = "cli")]
 mod examples;
 #[cfg(feature = "figure")]
