@@ -7,13 +7,14 @@
 
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
-use crate::domain::{Domain, Vec2};
-use crate::force::Backbone;
+use crate::domain::{Domain, Vec2, nearest};
+use crate::force::{Backbone, sum_of_forces};
 use crate::frame::Frame;
+use crate::wide::wide;
 
 /// How much more a pressure or a force may change, in means, than a particle may move, in mean radii: at the default of 0.01
-/// this is two hundredths of a colour map.
-const SHARE: f64 = 5.0;
+/// this is less than four hundredths of a colour map, and moves the edge of a line by half a hundredth of a radius.
+const SHARE: f64 = 10.0;
 
 /// Decides for each frame, in order, which of its pictures are drawn.
 pub(super) struct Redraw {
@@ -87,7 +88,7 @@ impl Redraw {
         }
         let stays = self.contacts.as_ref().is_some_and(|before| {
             let number = frame.forces.len().max(1) as f64;
-            let most = self.share * frame.forces.iter().sum::<f64>() / number;
+            let most = self.share * sum_of_forces(&frame.forces).1 / number;
             self.stand(&before.positions, &frame.positions) && before.bears_as(frame, most)
         });
         if stays && !snapshot.edge {
@@ -103,11 +104,23 @@ impl Redraw {
 
     /// Whether no particle has moved too far.
     fn stand(&self, before: &[Vec2], now: &[Vec2]) -> bool {
+        let (l, most) = (self.domain.lengths(), self.distance * self.distance);
+        // In pieces, each without a branch.
+        let mut pieces = before.chunks(64).zip(now.chunks(64));
         // At 0 a picture is left out for no reason, however alike.
         self.distance > 0.0
-            && before.iter().zip(now).all(|(a, b)| {
-                let moved = self.domain.minimum_image(b - a);
-                moved.norm_squared() <= self.distance * self.distance
+            && pieces.all(|(before, now)| {
+                wide(
+                    #[inline(always)]
+                    || {
+                        let mut near = true;
+                        for (a, b) in before.iter().zip(now) {
+                            let (x, y) = (nearest(b.x - a.x, l.x), nearest(b.y - a.y, l.y));
+                            near &= x * x + y * y <= most;
+                        }
+                        near
+                    },
+                )
             })
     }
 }
@@ -136,5 +149,17 @@ impl DrawnContacts {
 
 /// Whether numbers differ by no more than `most`.
 fn within(a: &[f64], b: &[f64], most: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most)
+    let mut pieces = a.chunks(64).zip(b.chunks(64));
+    pieces.all(|(a, b)| {
+        wide(
+            #[inline(always)]
+            || {
+                let mut near = true;
+                for (a, b) in a.iter().zip(b) {
+                    near &= (a - b).abs() <= most;
+                }
+                near
+            },
+        )
+    })
 }

@@ -15,7 +15,7 @@ use crate::packing::Packing;
 
 /// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
 /// is killed loses no more than two batches and what waits for them.
-const BATCH_BYTES: usize = 1 << 23;
+const BATCH_BYTES: usize = 1 << 22;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 

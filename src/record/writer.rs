@@ -21,6 +21,10 @@ const QUEUE_BYTES: usize = 1 << 25;
 const TOGETHER: u64 = 64;
 const TOGETHER_BYTES: usize = 1 << 19;
 
+/// How far threads that draw and write step back behind the run.
+#[cfg(target_os = "linux")]
+const NICE: i32 = 5;
+
 /// A recording in the making: takes snapshots, encodes and writes them on a thread of its own.
 ///
 /// # Example
@@ -223,6 +227,17 @@ impl Drop for Writer {
     }
 }
 
+/// Lets the run go first where threads compete for processors: snapshots can wait, up to what the queue holds.
+///
+/// On Linux only, where this is a property of the thread; elsewhere it would be one of the process.
+fn step_back() {
+    #[cfg(target_os = "linux")]
+    {
+        // It costs nothing but time if the system turns it down.
+        let _ = rustix::process::nice(NICE);
+    }
+}
+
 /// The thread's work.
 fn write<R: Recorder>(
     file: File,
@@ -236,6 +251,7 @@ fn write<R: Recorder>(
         source,
     };
     let cut = file.try_clone().map_err(start)?;
+    step_back();
     let mut recorder = start_recorder(file).map_err(|source| {
         drop(cut.set_len(0));
         start(source)

@@ -153,7 +153,7 @@ pub struct Channels {
     /// The lossless state, without which a recording can be looked at but not replayed.
     pub state: Schedule,
     /// A picture that its schedule asks for is left out as long as the one before it is right to this: no particle has moved
-    /// by more than `redraw` mean radii since, no pressure on a particle or force has changed by more than `5 redraw` of
+    /// by more than `redraw` mean radii since, no pressure on a particle or force has changed by more than `10 redraw` of
     /// their mean, and none has begun or ceased to rattle. 0 … 1; at 0 none is left out.
     pub redraw: f64,
 }

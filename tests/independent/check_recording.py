@@ -295,7 +295,7 @@ def check_left_out(recording, step, state, gamma):
             mean = (now := pressure(contacts, forces))[now > 0].mean()
             if list(rattles(n, contacts)) != list(rattles(n, pairs)):
                 sys.exit(f"step {step}: a rattler has changed since the picture of step {drawn}")
-        worst = max(worst, np.abs(change).max() / (5 * redraw * mean))
+        worst = max(worst, np.abs(change).max() / (10 * redraw * mean))
     return worst
 
 

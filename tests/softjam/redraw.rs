@@ -95,11 +95,11 @@ fn force_change(a: &Frame, b: &Frame) -> f64 {
 fn off(packing: &Packing, channel: usize, redraw: f64, a: &Frame, b: &Frame) -> f64 {
     let moved = moved(packing, a, b) / redraw;
     if channel == 1 {
-        return moved.max(force_change(a, b) / (5.0 * redraw));
+        return moved.max(force_change(a, b) / (10.0 * redraw));
     }
     let ((p, _, rattle), (q, mean, rattles)) = (pressures(packing, a), pressures(packing, b));
     let changes = p.iter().zip(&q).map(|(p, q)| (p - q).abs() / mean);
-    let change = changes.fold(0.0, f64::max) / (5.0 * redraw);
+    let change = changes.fold(0.0, f64::max) / (10.0 * redraw);
     let other = if rattle == rattles {
         0.0
     } else {

@@ -168,7 +168,7 @@ impl Newton {
     /// grown.
     pub(super) fn is_due(f_max: f64, law: &ContactLaw, goes_on: bool) -> bool {
         let most = if goes_on { GROWTH * SWITCH } else { SWITCH };
-        let (number, sum) = sum_of_forces(&law.numbered());
+        let (number, sum) = sum_of_forces(law.numbered().forces);
         f_max * law.line_tension() * number <= most * sum
     }
 
