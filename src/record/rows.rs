@@ -13,9 +13,11 @@ use crate::force::Metrics;
 use crate::frame::Frame;
 use crate::packing::Packing;
 
-/// A batch is written when it holds this many bytes or snapshots, or when it has come to span so many steps: a run that
-/// is killed loses no more than two batches and what waits for them.
+/// A batch is written when it holds this many bytes (twice as many if they are but a few snapshots, for each chunk costs time whatever
+/// it holds) or snapshots, or when it has come to span so many steps: a run that is killed loses no more than two batches and what
+/// waits for them.
 const BATCH_BYTES: usize = 1 << 22;
+const FEW_SNAPSHOTS: usize = 16;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
 
@@ -81,7 +83,8 @@ impl Rows {
         pending.snapshots += 1;
         pending.last = Some(snapshot.step);
         let first = *pending.first.get_or_insert(snapshot.step);
-        let whole = pending.bytes >= BATCH_BYTES
+        let few = pending.snapshots < FEW_SNAPSHOTS;
+        let whole = pending.bytes >= BATCH_BYTES * if few { 2 } else { 1 }
             || pending.snapshots >= BATCH_SNAPSHOTS
             || snapshot.step.saturating_sub(first) >= BATCH_SPAN;
         whole.then(|| self.batch())
