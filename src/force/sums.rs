@@ -8,8 +8,8 @@ use crate::contact::Contacts;
 use crate::domain::Vec2;
 use crate::wide::wide;
 
-/// Chains that are summed side by side.
-const CHAINS: usize = 4;
+/// Chains that are summed side by side: two registers of four, as one sum has to wait for the one before.
+const CHAINS: usize = 8;
 
 /// What a frame's contacts sum up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,14 +24,6 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn of(contacts: &Contacts<'_>) -> Self {
-        wide(
-            #[inline(always)]
-            || Self::of_all(contacts),
-        )
-    }
-
-    #[inline(always)]
-    fn of_all(contacts: &Contacts<'_>) -> Self {
         let (forces, f_rest) = contacts.forces.as_chunks();
         let (normals, n_rest) = contacts.normals.as_chunks();
         let (distances, r_rest) = contacts.distances.as_chunks();
@@ -44,27 +36,46 @@ impl Sums {
         r[..r_rest.len()].copy_from_slice(r_rest);
         delta[..delta_rest.len()].copy_from_slice(delta_rest);
 
+        // Each loop is compiled apart: with all that they add up together there are not enough registers.
         // The number of terms, and bounds of them: `|n_α n_β| ≤ 1` but for rounding.
-        let mut bounds = Bounds::default();
-        for (f, (r, delta)) in forces.iter().zip(distances.iter().zip(overlaps)) {
-            bounds.take(f, r, delta);
-        }
-        bounds.take(&f, &r, &delta);
+        let bounds = wide(
+            #[inline(always)]
+            || {
+                let mut bounds = Bounds::default();
+                for (f, (r, delta)) in forces.iter().zip(distances.iter().zip(overlaps)) {
+                    bounds.take(f, r, delta);
+                }
+                bounds.take(&f, &r, &delta);
+                bounds
+            },
+        );
         let terms = bounds.bearing.iter().sum::<f64>().max(2.0);
         let largest = |chains: [f64; CHAINS]| chains.into_iter().fold(0.0, larger);
         let of_moments = rounder(1.01 * terms * largest(bounds.moment));
         let of_work = rounder(terms * largest(bounds.work));
 
-        let mut work = [0.0; CHAINS];
-        for (f, delta) in forces.iter().zip(overlaps) {
-            add_work(&mut work, f, delta, of_work);
-        }
-        add_work(&mut work, &f, &delta, of_work);
-        let mut moments = [[0.0; CHAINS]; 3];
-        for (f, (r, n)) in forces.iter().zip(distances.iter().zip(normals)) {
-            add_moments(&mut moments, f, r, n, of_moments);
-        }
-        add_moments(&mut moments, &f, &r, &n, of_moments);
+        let work = wide(
+            #[inline(always)]
+            || {
+                let mut work = [0.0; CHAINS];
+                for (f, delta) in forces.iter().zip(overlaps) {
+                    add_work(&mut work, f, delta, of_work);
+                }
+                add_work(&mut work, &f, &delta, of_work);
+                work
+            },
+        );
+        let moments = wide(
+            #[inline(always)]
+            || {
+                let mut moments = [[0.0; CHAINS]; 3];
+                for (f, (r, n)) in forces.iter().zip(distances.iter().zip(normals)) {
+                    add_moments(&mut moments, f, r, n, of_moments);
+                }
+                add_moments(&mut moments, &f, &r, &n, of_moments);
+                moments
+            },
+        );
         Self {
             work: work.iter().sum(),
             moments: moments.map(|chains| chains.iter().sum()),
@@ -83,19 +94,19 @@ pub(crate) fn sum_of_forces(forces: &[f64]) -> (f64, f64) {
         || {
             let [mut bearing, mut most, mut sums] = [[0.0; CHAINS]; 3];
             for f in forces.iter().chain([&last]) {
-                for (bearing, f) in bearing.iter_mut().zip(f) {
-                    *bearing += if *f == 0.0 { 0.0 } else { 1.0 };
+                for k in 0..CHAINS {
+                    bearing[k] += if f[k] == 0.0 { 0.0 } else { 1.0 };
                 }
-                for (most, f) in most.iter_mut().zip(f) {
-                    *most = larger(*most, f.abs());
+                for k in 0..CHAINS {
+                    most[k] = larger(most[k], f[k].abs());
                 }
             }
             let number: f64 = bearing.iter().sum();
             let largest = most.into_iter().fold(0.0, larger);
             let rounder = rounder(number.max(2.0) * largest);
             for f in forces.iter().chain([&last]) {
-                for (sum, f) in sums.iter_mut().zip(f) {
-                    *sum += (f + rounder) - rounder;
+                for k in 0..CHAINS {
+                    sums[k] += (f[k] + rounder) - rounder;
                 }
             }
             (number, sums.iter().sum())
@@ -115,17 +126,23 @@ struct Bounds {
 impl Bounds {
     #[inline(always)]
     fn take(&mut self, f: &[f64; CHAINS], r: &[f64; CHAINS], delta: &[f64; CHAINS]) {
-        for (touching, f) in self.touching.iter_mut().zip(f) {
-            *touching += if *f > 0.0 { 1.0 } else { 0.0 };
-        }
-        for (bearing, f) in self.bearing.iter_mut().zip(f) {
-            *bearing += if *f == 0.0 { 0.0 } else { 1.0 };
+        let Self {
+            touching,
+            bearing,
+            moment,
+            work,
+        } = self;
+        for k in 0..CHAINS {
+            touching[k] += if f[k] > 0.0 { 1.0 } else { 0.0 };
         }
         for k in 0..CHAINS {
-            self.moment[k] = larger(self.moment[k], (f[k] * r[k]).abs());
+            bearing[k] += if f[k] == 0.0 { 0.0 } else { 1.0 };
         }
         for k in 0..CHAINS {
-            self.work[k] = larger(self.work[k], (f[k] * delta[k]).abs());
+            moment[k] = larger(moment[k], (f[k] * r[k]).abs());
+        }
+        for k in 0..CHAINS {
+            work[k] = larger(work[k], (f[k] * delta[k]).abs());
         }
     }
 }
