@@ -105,23 +105,17 @@ impl Redraw {
     /// Whether no particle has moved too far.
     fn stand(&self, before: &[Vec2], now: &[Vec2]) -> bool {
         let (l, most) = (self.domain.lengths(), self.distance * self.distance);
-        // In pieces, each without a branch.
-        let mut pieces = before.chunks(64).zip(now.chunks(64));
         // At 0 a picture is left out for no reason, however alike.
         self.distance > 0.0
-            && pieces.all(|(before, now)| {
-                wide(
-                    #[inline(always)]
-                    || {
-                        let mut near = true;
-                        for (a, b) in before.iter().zip(now) {
-                            let (x, y) = (nearest(b.x - a.x, l.x), nearest(b.y - a.y, l.y));
-                            near &= x * x + y * y <= most;
-                        }
-                        near
-                    },
-                )
-            })
+            && all(
+                before,
+                now,
+                #[inline(always)]
+                |a: &Vec2, b: &Vec2| {
+                    let (x, y) = (nearest(b.x - a.x, l.x), nearest(b.y - a.y, l.y));
+                    x * x + y * y <= most
+                },
+            )
     }
 }
 
@@ -149,17 +143,21 @@ impl DrawnContacts {
 
 /// Whether numbers differ by no more than `most`.
 fn within(a: &[f64], b: &[f64], most: f64) -> bool {
+    all(
+        a,
+        b,
+        #[inline(always)]
+        |a: &f64, b: &f64| (a - b).abs() <= most,
+    )
+}
+
+/// Whether all are `near` their counterparts: piece after piece, each without a branch.
+fn all<T>(a: &[T], b: &[T], near: impl Fn(&T, &T) -> bool) -> bool {
     let mut pieces = a.chunks(64).zip(b.chunks(64));
     pieces.all(|(a, b)| {
         wide(
             #[inline(always)]
-            || {
-                let mut near = true;
-                for (a, b) in a.iter().zip(b) {
-                    near &= (a - b).abs() <= most;
-                }
-                near
-            },
+            || a.iter().zip(b).fold(true, |all, (a, b)| all & near(a, b)),
         )
     })
 }
