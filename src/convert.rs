@@ -24,15 +24,14 @@
 //! # for name in ["a.rrd", "b.mcap", "c.rrd"] { std::fs::remove_file(path(name)).unwrap(); }
 //! ```
 
-use crate::domain::Vec2;
 use crate::force::{METRICS, Metrics};
 use crate::frame::Frame;
 use crate::record::{
-    Header, Outcome, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
+    Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
 };
 use crate::relax::{RelaxError, Relaxation};
 use crate::replay::{Event, ReadError, Recording};
-use crate::scene::{Channels, Scene, SceneError, Schedule};
+use crate::scene::{Channels, SceneError, Schedule};
 use std::collections::BTreeMap;
 
 /// What a conversion came to.
@@ -103,21 +102,13 @@ pub enum ConvertError {
 /// See the example of the [module](self).
 pub fn header(recording: &Recording, channels: Channels) -> Result<Header, ConvertError> {
     can_be_rebuilt(recording, &channels)?;
-    // Radii and box are all that a header has of a packing.
-    let anywhere = Frame {
-        positions: vec![Vec2::zeros(); recording.radii().len()],
-        ..Frame::default()
+    let mut header = Header {
+        program: PROGRAM.to_owned(),
+        ..recording.header()?
     };
-    let scene = Scene {
-        channels,
-        ..recording.scene().clone()
-    };
-    scene.validate()?;
-    Ok(Header {
-        scene,
-        packing: recording.packing(&anywhere)?,
-        from_step: recording.from_step(),
-    })
+    header.scene.channels = channels;
+    header.scene.validate()?;
+    Ok(header)
 }
 
 /// Writes what `channels` ask of `recording` with `writer`, whose header is that of [`header`].

@@ -80,3 +80,11 @@ pub mod scene;
 mod simplicial;
 pub mod threads;
 mod wide;
+
+/// The revision of the bits: a number that is raised whenever a change of the program alters a bit of any state. A scene gives
+/// the same bits with every version of one revision; of another revision a replay expects the same physics, not the same bits.
+///
+/// ```
+/// assert_eq!(softjam::BITS, 1);
+/// ```
+pub const BITS: u32 = 1;

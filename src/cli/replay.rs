@@ -118,7 +118,9 @@ fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
             }
         };
         let found = if wanted(Question::Determinism) {
-            determinism(&mut recording, way, post).map(Some)
+            let file = std::fs::File::open(&arguments.file).ok();
+            let file = file.map(|file| Box::new(std::io::BufReader::new(file)) as Box<dyn std::io::Read + Send>);
+            determinism(&mut recording, way, file, post).map(Some)
         } else {
             let end = loop {
                 match recording.next_state() {
@@ -267,6 +269,7 @@ impl Findings {
         if let Some(lacks) = self.lacks() {
             line("unfinished", lacks);
         }
+        if let Some(d) = &self.determinism { line("bytes", format!("{:?} {:?} run {}", d.bytes, d.origin, d.run)); }
         let verdict = match (self.good(), self.lacks()) {
             (true, None) => "verified",
             (true, Some(_)) => "verified as far as it goes",

@@ -2,7 +2,7 @@
 
 use super::columns::array;
 use super::encode::Encoder;
-use super::{FORMAT_VERSION, Header, PROGRAM, legend};
+use super::{FORMAT_VERSION, Header, legend};
 use crate::scene::{Scene, Start};
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
@@ -90,7 +90,11 @@ fn scene(header: &Header) -> DynamicArchetype {
             "format_version",
             array(UInt32Array::from(vec![FORMAT_VERSION])),
         )
-        .with_component_from_data("program", array(StringArray::from(vec![PROGRAM])))
+        .with_component_from_data(
+            "program",
+            array(StringArray::from(vec![header.program.as_str()])),
+        )
+        .with_component_from_data("bits", array(UInt32Array::from(vec![header.bits])))
         .with_component_from_data(
             "from_step",
             array(UInt64Array::from(vec![header.from_step])),
@@ -118,13 +122,14 @@ fn text(header: &Header) -> String {
     let mut parts = vec![format!(
         "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
          {:.3} × {:.3}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
-         {PROGRAM}.\n\n",
+         {}.\n\n",
         packing.len(),
         packing.coverage(),
         l.x,
         l.y,
         scene.line_tension,
         scene.threshold,
+        header.program,
     )];
     let channels = &scene.channels;
     let missing: Vec<&str> = [

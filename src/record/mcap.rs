@@ -23,7 +23,7 @@ use super::pictures::Network;
 use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
-use super::{FORMAT_VERSION, Header, Outcome, PROGRAM, Recorder, Snapshot, Written};
+use super::{FORMAT_VERSION, Header, Outcome, Recorder, Snapshot, Written};
 use crate::contact::FrameContacts;
 use crate::droplet::contour::Contours;
 use crate::frame::Frame;
@@ -112,7 +112,7 @@ impl<W: Write> McapRecorder<W> {
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let sink = Sink::new(sink);
         let mut writer = WriteOptions::new()
-            .library(PROGRAM.replace(' ', "/"))
+            .library(header.program.replace(' ', "/"))
             .compression(Some(mcap::Compression::Zstd))
             .compression_level(ZSTD_LEVEL)
             // More threads would give other bytes on another machine.
@@ -124,7 +124,8 @@ impl<W: Write> McapRecorder<W> {
         let log_time = header.from_step.saturating_mul(STEP_NANOSECONDS);
         let about = [
             ("format_version", FORMAT_VERSION.to_string()),
-            ("program", PROGRAM.to_owned()),
+            ("program", header.program.clone()),
+            ("bits", header.bits.to_string()),
             ("scene_digest", hex(header.scene.digest())),
             ("from_step", header.from_step.to_string()),
         ];

@@ -104,6 +104,10 @@ pub struct Header {
     pub packing: Packing,
     /// The step of the first frame; not 0 if the run goes on from another recording.
     pub from_step: u64,
+    /// The program that writes the recording, as `softjam 0.2.0`.
+    pub program: String,
+    /// The [revision of the bits](crate::BITS) that its states were computed with.
+    pub bits: u32,
 }
 
 impl Header {
@@ -116,6 +120,8 @@ impl Header {
             scene: scene.clone(),
             packing: run.packing().clone(),
             from_step: run.step(),
+            program: PROGRAM.to_owned(),
+            bits: crate::BITS,
         }
     }
 }

@@ -2,17 +2,20 @@
 //!
 //! The recorded frames are compared with those of a new run: from the scene, or segment by segment from one recorded frame to
 //! the next. A frame determines the next one, so both ways come to the same verdict: if every segment leads from its frame to
-//! the next and the first frame is the scene's, the whole is the scene's. Recorded metrics are compared too, at every step.
+//! the next and the first frame is the scene's, the whole is the scene's. Every row of the metrics has to stand there once, the
+//! result has to be where and how this run ends, and the file's bytes have to be those that it writes.
 
-use super::difference::{self, Difference, What};
-use super::{Metrics, ReadError, Recording, State};
-use crate::force::{Backbone, METRICS, Observables};
-use crate::frame::Frame;
-use crate::packing::Packing;
+use super::bytes;
+use super::difference::Difference;
+use super::ledger::Ledger;
+use super::walk::{End, Segment};
+use super::{ReadError, Recording, State};
+use crate::record::Snapshots;
 use crate::relax::{RelaxError, Relaxation};
 use crate::scene::Scene;
-use std::sync::Mutex;
+use std::io::Read;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// How the trajectory is run again.
 ///
@@ -39,8 +42,55 @@ pub struct Determinism {
     pub metrics: u64,
     /// The first and the last recorded step.
     pub steps: Option<(u64, u64)>,
+    /// Steps that were run, those in front of the first recorded one included.
+    pub run: u64,
+    /// Where the run began.
+    pub origin: Origin,
     /// The first difference, if there is one.
     pub difference: Option<Difference>,
+    /// What the comparison of the bytes came to.
+    pub bytes: Bytes,
+}
+
+/// Where a run that is compared with a recording began.
+///
+/// ```
+/// assert_eq!(softjam::replay::Origin::default(), softjam::replay::Origin::Scene);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Origin {
+    /// Where its scene does: nothing was taken from the recording.
+    #[default]
+    Scene,
+    /// At the positions and radii of the first recorded frame, since the scene starts from a file.
+    Positions,
+    /// At the first recorded frame as a whole, since the recording goes on from another one that starts from a file.
+    Frame,
+}
+
+/// What the comparison of a file's bytes with those that the run writes came to.
+///
+/// ```
+/// use softjam::replay::Bytes;
+/// assert_eq!(Bytes::default(), Bytes::NotCompared);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Bytes {
+    /// Nothing was compared: it was not asked for, or what the file holds differs already.
+    #[default]
+    NotCompared,
+    /// Every byte of the file is the run's.
+    Same(u64),
+    /// The file breaks off; so many bytes from its beginning are the run's.
+    SameUpTo(u64),
+    /// The file was laid out by another program or by another version of this one: what it holds was compared, not its bytes.
+    LaidOutOtherwise,
+    /// The file claims to be as this program writes it, and differs from this byte on: it is damaged, or was changed.
+    Differ {
+        /// The first byte that differs, counted from 0.
+        at: u64,
+    },
 }
 
 /// Why a replay came to no verdict.
@@ -72,15 +122,8 @@ pub enum ReplayError {
     },
 }
 
-/// The way from one recorded state to the next.
-struct Segment {
-    /// The state before; `None` for the first.
-    from: Option<Frame>,
-    to: Frame,
-    metrics: Metrics,
-}
-
-/// Runs a recording again and compares it with what was recorded; `watch` sees every recorded state first.
+/// Runs a recording again and compares it with what was recorded; `watch` sees every recorded state first. `file` is the file
+/// once more, from its first byte, if its bytes are to be compared, too.
 ///
 /// # Errors
 ///
@@ -90,7 +133,7 @@ struct Segment {
 /// # Example
 ///
 /// ```
-/// use softjam::replay::{determinism, Recording, Way};
+/// use softjam::replay::{determinism, Bytes, Recording, Way};
 /// # use softjam::{record, relax::Relaxation, scene::Scene};
 /// # let path = std::env::temp_dir().join("softjam-determinism-example.rrd");
 /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
@@ -99,206 +142,335 @@ struct Segment {
 /// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
 ///
 /// for way in [Way::Whole, Way::Segments(2)] {
-///     let verdict = determinism(&mut Recording::open(&path).unwrap(), way, |_| {}).unwrap();
+///     let file = std::fs::File::open(&path).unwrap();
+///     let mut recording = Recording::open(&path).unwrap();
+///     let verdict = determinism(&mut recording, way, Some(Box::new(file)), |_| {}).unwrap();
 ///     assert_eq!(verdict.difference, None);
+///     assert!(matches!(verdict.bytes, Bytes::Same(_)));
 /// }
 /// # std::fs::remove_file(&path).unwrap();
 /// ```
 pub fn determinism(
     recording: &mut Recording,
     way: Way,
+    file: Option<Box<dyn Read + Send>>,
     mut watch: impl FnMut(&State),
 ) -> Result<Determinism, ReplayError> {
     let scene = recording.scene().clone();
-    let mut verdict = Determinism::default();
-    match way {
-        Way::Whole => {
-            let mut whole = Whole::new(&scene);
-            each_segment(recording, &mut verdict, &mut watch, |segment, packing| {
-                whole.check(&segment, packing)
-            })?;
+    let bytes = match file {
+        Some(file) => {
+            let header = recording.header()?;
+            bytes::Recording::begin(recording.format(), header, file).ok()
         }
-        Way::Segments(threads) => {
-            let found: Mutex<Vec<Result<Option<Difference>, RelaxError>>> = Mutex::default();
-            let (queue, segments) = sync_channel::<(Segment, Packing)>(2 * threads);
-            let segments = Mutex::new(segments);
-            let (found_by, scene) = (&found, &scene);
-            std::thread::scope(|scope| {
-                for _ in 0..threads.max(1) {
-                    scope.spawn(|| work(scene, &segments, found_by));
-                }
-                // Moved in here, so that the workers see the end of the queue.
-                let queue: SyncSender<_> = queue;
-                each_segment(recording, &mut verdict, &mut watch, |segment, packing| {
-                    // Workers end only when the queue does.
-                    let _ = queue.send((segment, packing));
-                    Ok(None)
-                })
-            })?;
-            for result in found.into_inner().unwrap_or_default() {
-                let difference = result?;
-                verdict.difference = earlier(verdict.difference.take(), difference);
-            }
+        None => None,
+    };
+    let ledger = Ledger::new(scene.channels.metrics, bytes);
+    let mut verdict = Determinism {
+        origin: match recording.from_step() {
+            _ if scene.starts_from_disks() => Origin::Scene,
+            0 => Origin::Positions,
+            _ => Origin::Frame,
+        },
+        ..Determinism::default()
+    };
+    let (ledger, end) = match way {
+        Way::Whole => run_whole(recording, &scene, ledger, &mut verdict, &mut watch)?,
+        Way::Segments(n) => {
+            let threads = n.clamp(1, cores());
+            run_segments(recording, &scene, threads, ledger, &mut verdict, &mut watch)?
         }
-    }
-    if verdict.states == 0 {
-        return Err(ReplayError::NoState {
-            path: recording.path().to_owned(),
-            closed: recording.is_closed(),
-        });
-    }
+    };
+    conclude(recording, ledger, end, &mut verdict);
     Ok(verdict)
 }
 
-fn earlier(a: Option<Difference>, b: Option<Difference>) -> Option<Difference> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if b.step < a.step { b } else { a }),
-        (a, b) => a.or(b),
-    }
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Hands the way from each state to the next to `check`, until one differs.
+/// The end of the file against the end of the run.
+fn conclude(recording: &mut Recording, mut ledger: Ledger, end: End, verdict: &mut Determinism) {
+    ledger.find(recording.rows_left());
+    let closed = end.closed.then_some(end.outcome);
+    let compared = ledger.end(closed);
+    verdict.metrics = ledger.metrics();
+    verdict.difference = ledger.difference().cloned();
+    let Some(compared) = compared.filter(|_| verdict.difference.is_none()) else {
+        return;
+    };
+    verdict.bytes = match compared.first {
+        None if compared.ended => Bytes::Same(compared.bytes),
+        // What the file lacks at its end is no difference.
+        _ if !end.closed && compared.differing == 0 => Bytes::SameUpTo(compared.bytes),
+        Some(at) if !(recording.is_laid_out_otherwise() && compared.is_laid_out_otherwise()) => {
+            Bytes::Differ { at }
+        }
+        _ => Bytes::LaidOutOtherwise,
+    };
+}
+
+/// Reads the recorded states and hands the way from each to the next to `check`, until that has had enough; how the file ends.
 fn each_segment(
     recording: &mut Recording,
     verdict: &mut Determinism,
     watch: &mut impl FnMut(&State),
-    mut check: impl FnMut(Segment, Packing) -> Result<Option<Difference>, ReplayError>,
-) -> Result<(), ReplayError> {
-    let mut last: Option<Frame> = None;
-    while let Some(state) = recording.next_state()? {
+    mut check: impl FnMut(Segment) -> Result<bool, ReplayError>,
+) -> Result<End, ReplayError> {
+    let (mut last, mut goes_on) = (None, true);
+    let mut next = recording.next_state()?;
+    while let Some(state) = next.take() {
         watch(&state);
+        // Whether it is the last shows when there is none behind it.
+        let behind = recording.next_state();
+        let end = matches!(behind, Ok(None)).then(|| recording.end());
         let step = state.frame.step;
         verdict.states += 1;
-        verdict.metrics += state.metrics.values().map(|m| m.len() as u64).sum::<u64>();
         verdict.steps = Some((verdict.steps.map_or(step, |(first, _)| first), step));
-        let segment = Segment {
-            from: last.replace(state.frame.clone()),
-            to: state.frame,
-            metrics: state.metrics,
+        if goes_on {
+            goes_on = check(Segment {
+                from: last.replace(state.frame.clone()),
+                to: state.frame,
+                packing: state.packing,
+                rows: state.metrics,
+                end,
+            })?;
+        }
+        next = behind?;
+    }
+    let end = recording.end();
+    if verdict.states == 0 {
+        return Err(ReplayError::NoState {
+            path: recording.path().to_owned(),
+            closed: end.closed,
+        });
+    }
+    Ok(end)
+}
+
+/// One run along the whole recording.
+fn run_whole(
+    recording: &mut Recording,
+    scene: &Scene,
+    mut ledger: Ledger,
+    verdict: &mut Determinism,
+    watch: &mut impl FnMut(&State),
+) -> Result<(Ledger, End), ReplayError> {
+    let mut run: Option<Relaxation> = None;
+    let mut snapshots = Snapshots::default();
+    let mut began = 0;
+    let end = each_segment(recording, verdict, watch, |mut segment| {
+        ledger.find(core::mem::take(&mut segment.rows));
+        let run = match &mut run {
+            Some(run) => run,
+            none => match segment.run(scene)? {
+                Ok(new) => {
+                    began = new.step();
+                    none.insert(new)
+                }
+                Err(difference) => {
+                    ledger.differs(Some(difference));
+                    return Ok(false);
+                }
+            },
         };
-        if verdict.difference.is_none() {
-            verdict.difference = check(segment, state.packing)?;
+        let found = segment.walk(run, scene, &mut snapshots, |s| ledger.give(s))?;
+        ledger.differs(found);
+        Ok(ledger.difference().is_none())
+    })?;
+    if let Some(run) = &mut run {
+        go_on_behind(recording, scene, end, run, &mut snapshots, &mut ledger)?;
+        verdict.run = run.step() - began;
+    }
+    Ok((ledger, end))
+}
+
+/// Behind the last state of a file that breaks off there may be metrics: runs on as far as they go.
+fn go_on_behind(
+    recording: &mut Recording,
+    scene: &Scene,
+    end: End,
+    run: &mut Relaxation,
+    snapshots: &mut Snapshots,
+    ledger: &mut Ledger,
+) -> Result<(), ReplayError> {
+    if end.closed || ledger.difference().is_some() {
+        return Ok(());
+    }
+    ledger.find(recording.rows_left());
+    let until = ledger.found_without_gap_from(run.step());
+    while run.step() < until && run.status() == crate::relax::Status::Running {
+        run.advance()?;
+        if let Some(snapshot) = snapshots.take(run, &scene.channels, false)
+            && !ledger.give(snapshot)
+        {
+            break;
         }
     }
     Ok(())
 }
 
-/// One run along the whole recording.
-struct Whole<'a> {
-    scene: &'a Scene,
-    run: Option<Relaxation>,
-}
-
-impl<'a> Whole<'a> {
-    fn new(scene: &'a Scene) -> Self {
-        Self { scene, run: None }
-    }
-
-    fn check(
-        &mut self,
-        segment: &Segment,
-        packing: Packing,
-    ) -> Result<Option<Difference>, ReplayError> {
-        let run = match &mut self.run {
-            Some(run) => run,
-            none => none.insert(match first_run(self.scene, &segment.to, packing)? {
-                Ok(run) => run,
-                Err(difference) => return Ok(Some(difference)),
-            }),
-        };
-        Ok(walk(run, segment)?)
-    }
-}
-
-/// A run of the scene from its start, or how the recorded radii and box differ from the scene's.
-///
-/// A start from a file is what the first frame recorded of it; the file itself need not be at hand.
-fn first_run(
+/// A run a segment, on several threads. What they give reaches the ledger in the order of the segments.
+fn run_segments(
+    recording: &mut Recording,
     scene: &Scene,
-    first: &Frame,
-    recorded: Packing,
-) -> Result<Result<Relaxation, Difference>, RelaxError> {
-    if !scene.starts_from_disks() {
-        return Ok(Ok(if first.step == 0 {
-            Relaxation::of_packing(scene, recorded)?
-        } else {
-            // It goes on from another recording: its first frame is all there is.
-            Relaxation::resume(scene, recorded, first.clone())?
-        }));
-    }
-    let run = Relaxation::new(scene)?;
-    let numbers = |packing: &Packing| {
-        let l = packing.domain().lengths();
-        let mut numbers = vec![l.x, l.y];
-        numbers.extend_from_slice(packing.radii());
-        numbers
-    };
-    let (here, there) = (numbers(&recorded), numbers(run.packing()));
-    let what = if here.len() == there.len() {
-        difference::numbers(&here, &there, |k| match k {
-            0 => "L_x of the box".to_owned(),
-            1 => "L_y of the box".to_owned(),
-            _ => format!("radius of particle {}", k - 2),
+    threads: usize,
+    ledger: Ledger,
+    verdict: &mut Determinism,
+    watch: &mut impl FnMut(&State),
+) -> Result<(Ledger, End), ReplayError> {
+    let turns = Turns::new(ledger);
+    let (queue, segments) = sync_channel::<(u64, Segment)>(2 * threads);
+    let segments = Mutex::new(segments);
+    let turns_by = &turns;
+    let end = std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| work(scene, &segments, turns_by));
+        }
+        // Moved in here, so that the workers see the end of the queue.
+        let queue: SyncSender<_> = queue;
+        let mut numbers = 0..;
+        each_segment(recording, verdict, watch, |segment| {
+            // Workers end only when the queue does.
+            let _ = queue.send((numbers.next().unwrap_or_default(), segment));
+            Ok(turns_by.goes_on())
         })
-    } else {
-        difference::count("particles", here.len() - 2, there.len() - 2)
-    };
-    let step = first.step;
-    Ok(what.map_or(Ok(run), |what| Err(Difference { step, what })))
+    })?;
+    let (mut ledger, last, failure) = turns.end();
+    if let Some(failure) = failure {
+        return Err(failure.into());
+    }
+    if let Some(mut run) = last {
+        let mut snapshots = Snapshots::default();
+        go_on_behind(recording, scene, end, &mut run, &mut snapshots, &mut ledger)?;
+    }
+    if let Some((first, last)) = verdict.steps {
+        let scene = verdict.origin == Origin::Scene;
+        verdict.run = last - if scene { 0 } else { first };
+    }
+    Ok((ledger, end))
 }
 
-/// Advances `run` to the segment's end; the first difference on the way.
-fn walk(run: &mut Relaxation, segment: &Segment) -> Result<Option<Difference>, RelaxError> {
-    let mut backbone = Backbone::default();
-    loop {
-        if let Some(metrics) = segment.metrics.get(&run.step())
-            && let Some(what) = metrics_differ(&run.observables_counted(&mut backbone), metrics)
-        {
-            let step = run.step();
-            return Ok(Some(Difference { step, what }));
+/// Whose turn it is to add to the ledger.
+struct Turns {
+    state: Mutex<TurnState>,
+    passed: Condvar,
+}
+
+struct TurnState {
+    /// The segment whose turn it is.
+    turn: u64,
+    ledger: Ledger,
+    /// The run at the end of the last segment that was walked.
+    last: Option<Relaxation>,
+    failure: Option<RelaxError>,
+}
+
+impl Turns {
+    fn new(ledger: Ledger) -> Self {
+        let state = TurnState {
+            turn: 0,
+            ledger,
+            last: None,
+            failure: None,
+        };
+        Self {
+            state: Mutex::new(state),
+            passed: Condvar::new(),
         }
-        if run.step() >= segment.to.step {
-            return Ok(Difference::between(&segment.to, &run.frame()));
-        }
-        run.advance()?;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, TurnState> {
+        // A panic elsewhere ends the replay anyway.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits for the turn of a segment.
+    fn wait(&self, segment: u64) -> MutexGuard<'_, TurnState> {
+        let state = self.lock();
+        self.passed
+            .wait_while(state, |state| state.turn != segment)
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether nothing differs and nothing has failed yet.
+    fn goes_on(&self) -> bool {
+        let state = self.lock();
+        state.ledger.difference().is_none() && state.failure.is_none()
+    }
+
+    fn end(self) -> (Ledger, Option<Relaxation>, Option<RelaxError>) {
+        let state = self
+            .state
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        (state.ledger, state.last, state.failure)
     }
 }
 
-fn metrics_differ(o: &Observables, recorded: &[(&'static str, f64)]) -> Option<What> {
-    let computed = o.metrics();
-    recorded.iter().find_map(|(name, here)| {
-        let there = computed[METRICS.iter().position(|n| n == name)?];
-        (here.to_bits() != there.to_bits()).then(|| What::Value {
-            name: format!("metric {name}"),
-            here: *here,
-            there,
-        })
-    })
+/// A segment's turn, which is passed on however the segment ends.
+struct Turn<'a> {
+    turns: &'a Turns,
+    segment: u64,
 }
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        self.turns.wait(self.segment).turn += 1;
+        self.turns.passed.notify_all();
+    }
+}
+
+/// Snapshots that a segment holds until it is its turn: so many bytes of frames, and so many of them.
+const HELD_BYTES: usize = 1 << 22;
+const HELD: usize = 1 << 14;
 
 /// A thread's work: segments until the queue ends.
-fn work(
-    scene: &Scene,
-    segments: &Mutex<Receiver<(Segment, Packing)>>,
-    found: &Mutex<Vec<Result<Option<Difference>, RelaxError>>>,
-) {
+fn work(scene: &Scene, segments: &Mutex<Receiver<(u64, Segment)>>, turns: &Turns) {
     loop {
         let next = segments.lock().ok().and_then(|queue| queue.recv().ok());
-        let Some((segment, packing)) = next else {
+        let Some((number, mut segment)) = next else {
             return;
         };
-        let run = match &segment.from {
-            Some(from) => Relaxation::resume(scene, packing, from.clone()).map(Ok),
-            None => first_run(scene, &segment.to, packing),
+        let turn = Turn {
+            turns,
+            segment: number,
         };
+        let mut rows = Some(core::mem::take(&mut segment.rows));
+        let (mut held, mut bytes) = (Vec::new(), 0);
+        let mut pass = |held: &mut Vec<_>| {
+            let mut state = turns.wait(number);
+            if let Some(rows) = rows.take() {
+                state.ledger.find(rows);
+            }
+            // What comes behind a difference is not compared.
+            held.drain(..).all(|s| state.ledger.give(s)) && state.failure.is_none()
+        };
+        let run = segment.run(scene);
         let result = run.and_then(|run| match run {
-            Ok(mut run) => walk(&mut run, &segment),
-            Err(difference) => Ok(Some(difference)),
+            Ok(mut run) => {
+                let found = segment.walk(&mut run, scene, &mut Snapshots::default(), |s| {
+                    bytes += s.frame.as_ref().map_or(0, crate::frame::Frame::bytes);
+                    held.push(s);
+                    if bytes < HELD_BYTES && held.len() < HELD {
+                        return true;
+                    }
+                    bytes = 0;
+                    pass(&mut held)
+                })?;
+                Ok((found, Some(run)))
+            }
+            Err(difference) => Ok((Some(difference), None)),
         });
-        if !matches!(result, Ok(None))
-            && let Ok(mut found) = found.lock()
-        {
-            found.push(result);
+        pass(&mut held);
+        let mut state = turns.wait(number);
+        match result {
+            Ok((found, run)) => {
+                state.ledger.differs(found);
+                state.last = run;
+            }
+            Err(failure) => state.failure = state.failure.take().or(Some(failure)),
         }
+        drop(state);
+        drop(turn);
     }
 }

@@ -63,6 +63,63 @@ pub enum What {
     },
     /// The other side has another step.
     Step(u64),
+    /// A row of the metrics that is missing, or one too many.
+    Row {
+        /// The metric.
+        name: &'static str,
+        /// What is wrong with it.
+        row: Row,
+    },
+    /// The run ends at this step, where the recording goes on or names no result.
+    Ends {
+        /// Whether it has converged there; else it has reached its step limit.
+        converged: bool,
+    },
+    /// The run does not end at this step, where the recording says that it did.
+    GoesOn {
+        /// Its `f_max` there (units of γ).
+        f_max: f64,
+    },
+    /// The recorded result says something else of the end.
+    Converged {
+        /// Whether the run has converged there.
+        there: bool,
+    },
+    /// The recorded result names another number of steps than its last state.
+    Steps {
+        /// What it names.
+        here: u64,
+    },
+}
+
+/// What is wrong with a row.
+///
+/// ```
+/// use softjam::replay::Row;
+/// assert_eq!(Row::Missing.to_string(), "is missing");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Row {
+    /// The schedule asks for it.
+    Missing,
+    /// It stands there more than once.
+    Twice,
+    /// The schedule does not ask for it.
+    NotAsked,
+    /// It stands behind the end of the recorded run.
+    BehindTheEnd,
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Missing => "is missing",
+            Self::Twice => "stands there more than once",
+            Self::NotAsked => "stands there and is not asked for by the scene",
+            Self::BehindTheEnd => "stands behind the end of the run",
+        })
+    }
 }
 
 impl Difference {
@@ -153,6 +210,23 @@ impl fmt::Display for Difference {
                 there,
             } => write!(f, "contact {contact} is {here:?} here, {there:?} there"),
             What::Step(there) => write!(f, "step {there} there"),
+            What::Row { name, row } => write!(f, "metric {name} {row}"),
+            What::Ends { converged: true } => {
+                write!(f, "the run converges here, and the recording says otherwise")
+            }
+            What::Ends { converged: false } => write!(
+                f,
+                "the run reaches its step limit here, and the recording says otherwise"
+            ),
+            What::GoesOn { f_max } => write!(
+                f,
+                "the run does not end here (f_max = {f_max:e} γ), and the recording says that it did"
+            ),
+            What::Converged { there } => {
+                let word = if *there { "has" } else { "has not" };
+                write!(f, "the run {word} converged here, and the result says otherwise")
+            }
+            What::Steps { here } => write!(f, "the result names {here} steps"),
         }
     }
 }

@@ -8,19 +8,22 @@
 //! two recordings against each other.
 
 mod balance;
+mod bytes;
 mod compare;
 mod determinism;
 mod difference;
+mod ledger;
 mod mcap;
 mod recording;
 mod rrd;
 mod source;
 mod steps;
+mod walk;
 
 pub use balance::{Balance, Worst};
 pub use compare::{Comparison, compare};
-pub use determinism::{Determinism, ReplayError, Way, determinism};
-pub use difference::{Difference, What, ulps};
+pub use determinism::{Bytes, Determinism, Origin, ReplayError, Way, determinism};
+pub use difference::{Difference, Row, What, ulps};
 pub use recording::{Metrics, Recording, State};
 pub use source::reading_damaged_bytes;
 

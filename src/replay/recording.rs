@@ -4,11 +4,12 @@ use super::mcap::McapSource;
 use super::rrd::RrdSource;
 use super::source::{Ending, Header, Item, Problem, Source};
 use super::steps::Steps;
+use super::walk::End;
 use super::{Event, ReadError, mcap, rrd};
-use crate::domain::Domain;
+use crate::domain::{Domain, Vec2};
 use crate::frame::Frame;
 use crate::packing::{Packing, coverage};
-use crate::record::{Format, Outcome};
+use crate::record::{Format, Outcome, PROGRAM};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
@@ -247,6 +248,35 @@ impl Recording {
         &self.header.program
     }
 
+    /// The [revision of the bits](crate::BITS) that it was recorded with.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn bits(&self) -> u32 {
+        self.header.bits
+    }
+
+    /// The header of a recording like this one.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError::Damaged`] if its radii and box make no packing.
+    ///
+    /// See the example of [`Recording`].
+    pub fn header(&self) -> Result<crate::record::Header, ReadError> {
+        // Radii and box are all that a header has of a packing.
+        let anywhere = vec![Vec2::zeros(); self.header.radii.len()];
+        let packing = Packing::new(self.header.domain, self.header.radii.clone(), anywhere)
+            .map_err(|error| self.damaged(error.to_string()))?;
+        Ok(crate::record::Header {
+            scene: self.header.scene.clone(),
+            packing,
+            from_step: self.header.from_step,
+            program: self.header.program.clone(),
+            bits: self.header.bits,
+        })
+    }
+
     /// The step that the recording begins with; not 0 if its run went on from another recording.
     ///
     /// See the example of [`Recording`].
@@ -298,6 +328,24 @@ impl Recording {
         let radii = self.header.radii.clone();
         Packing::new(self.header.domain, radii, frame.positions.clone())
             .map_err(|error| self.damaged(error.to_string()))
+    }
+
+    /// The rows of the metrics that no state has taken along.
+    pub(super) fn rows_left(&mut self) -> Metrics {
+        core::mem::take(&mut self.metrics)
+    }
+
+    /// How the file ends, once its end is reached.
+    pub(super) fn end(&self) -> End {
+        End {
+            closed: self.is_closed(),
+            outcome: self.outcome,
+        }
+    }
+
+    /// Whether the file does not claim to be as this version writes it: another program, or another version, wrote it.
+    pub(super) fn is_laid_out_otherwise(&self) -> bool {
+        !self.source.is_of_softjam() || self.header.program != PROGRAM
     }
 
     /// How the run ended, as far as it has been read.

@@ -15,6 +15,9 @@ pub(super) trait Source: Send {
 
     /// How the file ended; `None` before its end.
     fn ending(&self) -> Option<Ending>;
+
+    /// Whether the file is laid out as softjam does it, as far as its format says so.
+    fn is_of_softjam(&self) -> bool;
 }
 
 /// Something that was found.
@@ -63,6 +66,8 @@ pub(super) struct Header {
     pub radii: Vec<f64>,
     pub domain: Domain,
     pub program: String,
+    /// The revision of the bits; the first did not say so.
+    pub bits: u32,
     /// The step that the recording begins with; not 0 if its run went on from another recording.
     pub from_step: u64,
 }

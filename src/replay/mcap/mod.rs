@@ -26,6 +26,8 @@ pub(super) const MAGIC: &[u8] = mcap::MAGIC;
 pub(super) struct McapSource {
     stream: Stream,
     topics: Topics,
+    /// Whether its library is softjam's.
+    of_softjam: bool,
     /// How the run ended. Other writers may put it in front of the states, so it is kept for the end.
     result: Option<Item>,
 }
@@ -54,6 +56,7 @@ impl Topics {
 struct About {
     program: String,
     scene_digest: String,
+    bits: u32,
     from_step: u64,
 }
 
@@ -79,6 +82,7 @@ impl McapSource {
         let mut toml: Option<String> = None;
         let mut packing: Option<(Vec<f64>, Domain)> = None;
         let mut result = None;
+        let mut of_softjam = false;
         loop {
             if let (Some(about), Some(toml), Some((radii, domain))) = (&about, &toml, &packing) {
                 let header = Header {
@@ -86,11 +90,13 @@ impl McapSource {
                     radii: radii.clone(),
                     domain: *domain,
                     program: about.program.clone(),
+                    bits: about.bits,
                     from_step: about.from_step,
                 };
                 let source = Self {
                     stream,
                     topics,
+                    of_softjam,
                     result,
                 };
                 return Ok((source, header));
@@ -108,6 +114,7 @@ impl McapSource {
                     result = Some(read_result(&data.metadata).map_err(not_mcap)?);
                 }
                 Some(Record::Channel(channel)) => topics.add(channel).map_err(not_mcap)?,
+                Some(Record::Header(file)) => of_softjam = file.library.starts_with("softjam/"),
                 Some(Record::Message { header, data })
                     if topics.of(&header) == topic::PARTICLES =>
                 {
@@ -138,6 +145,7 @@ fn read_about(path: &str, metadata: &BTreeMap<String, String>) -> Result<Option<
     Ok(Some(About {
         program: text("program"),
         scene_digest: text("scene_digest"),
+        bits: text("bits").parse().unwrap_or(1),
         from_step: text("from_step").parse().unwrap_or(0),
     }))
 }
@@ -197,6 +205,10 @@ impl Source for McapSource {
 
     fn ending(&self) -> Option<Ending> {
         self.stream.ending()
+    }
+
+    fn is_of_softjam(&self) -> bool {
+        self.of_softjam
     }
 }
 

@@ -16,6 +16,7 @@ struct About {
     /// The recording's id, as its scene makes it.
     id: String,
     program: String,
+    bits: u32,
     from_step: u64,
 }
 
@@ -45,6 +46,7 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
                     scene,
                     id,
                     program,
+                    bits,
                     from_step,
                 } = about.ok_or(missing("scene"))?;
                 if store.recording_id().as_str() != id {
@@ -61,6 +63,7 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
                     radii,
                     domain,
                     program,
+                    bits,
                     from_step,
                 };
                 return Ok((store, header));
@@ -86,10 +89,12 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
     };
     let (scene, digest) = read_scene(path, &toml)?;
     let mut from_steps = chunk.iter_slices::<u64>("softjam.Scene:from_step".into());
+    let mut bits = chunk.iter_slices::<u32>("softjam.Scene:bits".into());
     Ok(Some(About {
         scene,
         id: id_of(digest),
         program: text("softjam.Scene:program").unwrap_or_default(),
+        bits: bits.next().and_then(|l| l.first().copied()).unwrap_or(1),
         from_step: from_steps
             .next()
             .and_then(|l| l.first().copied())

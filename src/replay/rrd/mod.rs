@@ -68,6 +68,10 @@ impl Source for RrdSource {
     fn ending(&self) -> Option<Ending> {
         self.stream.ending()
     }
+
+    fn is_of_softjam(&self) -> bool {
+        self.stream.is_plain()
+    }
 }
 
 /// Takes the rows of an entity apart.

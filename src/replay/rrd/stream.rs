@@ -12,7 +12,7 @@ use rerun::external::arrow::ipc::root_as_message;
 use rerun::external::re_log_encoding::ToApplication as _;
 use rerun::external::re_log_encoding::external::lz4_flex;
 use rerun::external::re_log_encoding::rrd::{
-    Decodable as _, MessageHeader, MessageKind, StreamFooter, StreamHeader,
+    Compression as StreamCompression, Decodable as _, MessageHeader, MessageKind, StreamFooter, StreamHeader,
 };
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::log::Chunk;
@@ -25,6 +25,8 @@ pub(super) struct Stream {
     offset: u64,
     bytes: Vec<u8>,
     ending: Option<Ending>,
+    /// Whether it says that its messages are not compressed, as softjam's are.
+    plain: bool,
 }
 
 /// A message that matters here.
@@ -48,14 +50,21 @@ impl Stream {
             io::ErrorKind::UnexpectedEof => format!("it has only {length} bytes"),
             _ => e.to_string(),
         })?;
-        StreamHeader::from_rrd_bytes(&header).map_err(|e| e.to_string())?;
+        let StreamHeader { options, .. } =
+            StreamHeader::from_rrd_bytes(&header).map_err(|e| e.to_string())?;
         Ok(Self {
             source,
             length,
             offset: header.len() as u64,
             bytes: Vec::new(),
             ending: None,
+            plain: options.compression == StreamCompression::Off,
         })
+    }
+
+    /// Whether the stream says that its messages are not compressed: rerun's tools compress what they write.
+    pub fn is_plain(&self) -> bool {
+        self.plain
     }
 
     /// How the stream ended; `None` before its end.

@@ -1,0 +1,152 @@
+//! The run along a stretch of a recording: from one recorded state to the next.
+
+use super::difference::{self, Difference, What};
+use super::Metrics;
+use crate::frame::Frame;
+use crate::packing::Packing;
+use crate::record::{Outcome, Snapshot, Snapshots};
+use crate::relax::{RelaxError, Relaxation, Status};
+use crate::scene::{Scene, Schedule};
+use std::sync::Arc;
+
+/// The way from one recorded state to the next.
+pub(super) struct Segment {
+    /// The state before; `None` for the first.
+    pub from: Option<Frame>,
+    /// The state at its end, and the packing at it.
+    pub to: Frame,
+    pub packing: Packing,
+    /// Metrics that the file has on the way, and late ones.
+    pub rows: Metrics,
+    /// How the file ends behind it, if it does.
+    pub end: Option<End>,
+}
+
+/// The end of a file.
+#[derive(Clone, Copy)]
+pub(super) struct End {
+    /// Whether its writer closed it.
+    pub closed: bool,
+    /// The recorded result.
+    pub outcome: Option<Outcome>,
+}
+
+impl Segment {
+    /// The run at the beginning of the segment, or how the recorded radii and box differ from the scene's.
+    pub fn run(&self, scene: &Scene) -> Result<Result<Relaxation, Difference>, RelaxError> {
+        match &self.from {
+            Some(from) => Relaxation::resume(scene, self.packing.clone(), from.clone()).map(Ok),
+            None => first_run(scene, &self.to, &self.packing),
+        }
+    }
+
+    /// Advances `run` to the segment's end and hands on what is recorded on the way, until `emit` has had enough; the first
+    /// difference of the states and the end.
+    pub fn walk(
+        &self,
+        run: &mut Relaxation,
+        scene: &Scene,
+        snapshots: &mut Snapshots,
+        mut emit: impl FnMut(Arc<Snapshot>) -> bool,
+    ) -> Result<Option<Difference>, RelaxError> {
+        let (to, first) = (self.to.step, self.from.is_none());
+        while run.step() < to {
+            if let Some(end) = ended(run) {
+                return Ok(Some(end));
+            }
+            run.advance()?;
+            // What is in front of the first recorded state is in another recording.
+            if run.step() < to
+                && !first
+                && let Some(snapshot) = snapshots.take(run, &scene.channels, false)
+                && !emit(snapshot)
+            {
+                return Ok(None);
+            }
+        }
+        let edge = first || self.is_last(run, scene.channels.state);
+        if let Some(snapshot) = snapshots.take(run, &scene.channels, edge)
+            && !emit(snapshot)
+        {
+            return Ok(None);
+        }
+        let frame = run.frame();
+        let end = self.end.filter(|end| end.closed);
+        let differs = Difference::between(&self.to, &frame);
+        Ok(differs.or_else(|| end.and_then(|end| end.differs(run))))
+    }
+
+    /// Whether the run was ended at the segment's end: every channel that is on has recorded it.
+    fn is_last(&self, run: &Relaxation, schedule: Schedule) -> bool {
+        let closed = self.end.is_some_and(|end| end.closed);
+        closed || run.status() != Status::Running || !schedule.includes(self.to.step)
+    }
+}
+
+impl End {
+    /// How the end of a file that was closed differs from where and how the run ends.
+    fn differs(self, run: &Relaxation) -> Option<Difference> {
+        let step = run.step();
+        let converged = run.status() == Status::Converged;
+        let what = match (self.outcome, run.status() != Status::Running) {
+            // Somebody ended the run.
+            (None, false) => None,
+            (None, true) => Some(What::Ends { converged }),
+            (Some(_), false) => Some(What::GoesOn { f_max: run.f_max() }),
+            (Some(end), true) if end.converged != converged => {
+                Some(What::Converged { there: converged })
+            }
+            (Some(end), true) if end.steps != step => Some(What::Steps { here: end.steps }),
+            (Some(end), true) => {
+                difference::numbers(&[end.f_max], &[run.f_max()], |_| "f_max of the result".into())
+            }
+        };
+        what.map(|what| Difference { step, what })
+    }
+}
+
+/// The difference that it is for a recording to go on where the run ends.
+fn ended(run: &Relaxation) -> Option<Difference> {
+    let converged = run.status() == Status::Converged;
+    let what = What::Ends { converged };
+    let step = run.step();
+    (run.status() != Status::Running).then_some(Difference { step, what })
+}
+
+/// A run of the scene from its start, or how the recorded radii and box differ from the scene's.
+///
+/// A start from a file is what the first frame recorded of it; the file itself need not be at hand.
+fn first_run(
+    scene: &Scene,
+    first: &Frame,
+    recorded: &Packing,
+) -> Result<Result<Relaxation, Difference>, RelaxError> {
+    if !scene.starts_from_disks() {
+        return Ok(Ok(if first.step == 0 {
+            Relaxation::of_packing(scene, recorded.clone())?
+        } else {
+            // It goes on from another recording: its first frame is all there is.
+            Relaxation::resume(scene, recorded.clone(), first.clone())?
+        }));
+    }
+    let step = first.step;
+    // Before the disks of a scene are relaxed that the file has nothing to do with.
+    let count = difference::count("particles", recorded.len(), scene.particles);
+    if let Some(what) = count {
+        return Ok(Err(Difference { step, what }));
+    }
+    let run = Relaxation::new(scene)?;
+    let numbers = |packing: &Packing| {
+        let l = packing.domain().lengths();
+        let mut numbers = vec![l.x, l.y];
+        numbers.extend_from_slice(packing.radii());
+        numbers
+    };
+    let (here, there) = (numbers(recorded), numbers(run.packing()));
+    let what = difference::numbers(&here, &there, |k| match k {
+        0 => "L_x of the box".to_owned(),
+        1 => "L_y of the box".to_owned(),
+        _ => format!("radius of particle {}", k - 2),
+    });
+    Ok(what.map_or(Ok(run), |what| Err(Difference { step, what })))
+}
