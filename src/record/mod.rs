@@ -30,6 +30,7 @@ mod live;
 mod mcap;
 mod memory;
 pub(crate) mod messages;
+mod patience;
 mod pictures;
 mod pipeline;
 mod redraw;
