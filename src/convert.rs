@@ -113,9 +113,12 @@ pub fn header(recording: &Recording, channels: Channels) -> Result<Header, Conve
 
 /// Writes what `channels` ask of `recording` with `writer`, whose header is that of [`header`].
 ///
+/// The new file takes its place when it is whole.
+///
 /// # Errors
 ///
-/// [`ConvertError`]; the new file is then closed as one of an unfinished run and holds what came before the error.
+/// [`ConvertError`]. With [`ConvertError::Read`] the new file is closed as one of an unfinished run and holds the states that came
+/// before the damage; if there were none, or with any other error, there is no new file, and one that was there is as it was.
 ///
 /// See the example of the [module](self).
 pub fn convert(
@@ -123,6 +126,7 @@ pub fn convert(
     writer: Writer,
     channels: &Channels,
 ) -> Result<Converted, ConvertError> {
+    writer.wait_until_whole();
     can_be_rebuilt(recording, channels)?;
     let mut conversion = Conversion {
         writer,
@@ -365,6 +369,19 @@ impl Conversion {
         recording: &Recording,
         damage: Option<ReadError>,
     ) -> Result<Converted, ConvertError> {
+        let nothing = recording.scene().channels.state.is_on() && recording.intact().is_none();
+        if nothing && (damage.is_some() || !recording.is_closed()) {
+            return Err(damage.map_or_else(
+                || {
+                    ConvertError::Read(ReadError::Damaged {
+                        path: recording.path().to_owned(),
+                        problem: "it breaks off before its first state".to_owned(),
+                        intact: None,
+                    })
+                },
+                ConvertError::Read,
+            ));
+        }
         if let Some(frame) = self.last.take() {
             // The last recorded frame of a file that breaks off is only the last if it is not on the schedule.
             self.write_frame(recording, &frame, true)?;

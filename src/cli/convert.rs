@@ -1,7 +1,7 @@
 //! `softjam convert`: from one format to the other, with more channels or fewer.
 
 use super::flags::ChannelFlags;
-use super::output::{Output, open_with};
+use super::output::{Output, end_when_interrupted, open_with};
 use super::{Verdict, print};
 use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
@@ -19,7 +19,9 @@ Examples:
                                                             everything else, rebuilt from it
   softjam convert run.rrd fine.rrd --channels state,metrics,contours=every:1
                                                             steps that run.rrd lacks are computed again
-States, metrics, scene and result go over as they are; contours and contacts are drawn anew from the states.
+States, metrics, scene and result go over as they are; contours and contacts are drawn anew from the states. OUT is written as
+OUT.part and takes its place when it is whole: until then an existing OUT is as it was. What a killed convert (kill -9) has left as
+OUT.part the next one takes over.
 
 Exit codes: 0 converted, 1 could not be done, or the recording is damaged or breaks off (what came before is converted), 2 the
 request makes no sense")]
@@ -35,7 +37,7 @@ pub struct Arguments {
     #[command(flatten)]
     channels: ChannelFlags,
 
-    /// Replace an existing file.
+    /// Replace an existing file, when the new one is whole.
     #[arg(long, short)]
     force: bool,
 }
@@ -43,17 +45,24 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let output = Output::named(&arguments.output);
     output.check(&[Some(&arguments.input)], arguments.force)?;
+    end_when_interrupted()?;
     let mut recording = Recording::open(&arguments.input)?;
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
     let header = convert::header(&recording, channels)?;
-    let writer = Writer::create(&output.path, arguments.force, header)?;
+    let writer = Writer::start(output.format, output.begin(arguments.force)?, header)?;
     let converted = convert::convert(&mut recording, writer, &channels);
+    let without_states = !recording.scene().channels.state.is_on();
     let converted = converted.map_err(|error| match error {
-        ConvertError::Read(error) => anyhow::Error::new(error).context(format!(
-            "{} holds what came before the damage",
-            output.path.display()
-        )),
+        ConvertError::Read(error) => {
+            let path = output.path.display();
+            let error = anyhow::Error::new(error);
+            if without_states || recording.intact().is_some() {
+                error.context(format!("{path} holds what came before the damage"))
+            } else {
+                error.context(format!("{path} was not made or replaced"))
+            }
+        }
         other => other.into(),
     })?;
     let mut text = String::new();

@@ -1,5 +1,6 @@
 //! `softjam figure`: pictures for papers and talks.
 
+use super::output::{Output, end_when_interrupted};
 use super::{Verdict, print};
 use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
@@ -50,7 +51,7 @@ pub struct Arguments {
     #[arg(long)]
     no_chains: bool,
 
-    /// Replace an existing file.
+    /// Replace an existing file, when the new one is whole.
     #[arg(long, short)]
     force: bool,
 }
@@ -75,7 +76,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let output = &arguments.output;
     figure::check_name(output)?;
     let inputs: Vec<Option<&Path>> = arguments.files.iter().map(|f| Some(f.as_path())).collect();
-    super::output::Output::named(output).check(&inputs, arguments.force)?;
+    Output::named(output).check(&inputs, arguments.force)?;
+    end_when_interrupted()?;
+    let file = Output::named(output).begin(arguments.force)?;
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path));
         figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
@@ -88,7 +91,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         };
         packing(path, arguments)?
     };
-    figure::write(output, &svg)?;
+    figure::write_into(file, &svg)?;
     print(&format!("figure         {}\n", output.display()))?;
     Ok(Verdict::Good)
 }

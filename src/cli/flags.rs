@@ -35,7 +35,7 @@ pub struct SceneFlags {
     /// Start from a CSV file with the header x,y,radius and a comment `# box = L_x, L_y`; N, φ and radii are the file's, and
     /// no disks are relaxed first.
     #[arg(long, value_name = "PACKING.csv", help_heading = PACKING)]
-    file: Option<String>,
+    file: Option<PathBuf>,
 
     /// Line tension γ of the contours, the unit of force, 1e-100 … 1e100 [default: 1].
     #[arg(long, value_name = "GAMMA", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
@@ -131,6 +131,16 @@ impl SceneFlags {
         self.scene.as_deref()
     }
 
+    /// The start file that a flag names.
+    pub fn file(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+
+    /// The start file whose name no scene can hold, since it is not UTF-8.
+    pub fn file_unlike_text(&self) -> Option<&Path> {
+        self.file().filter(|path| path.to_str().is_none())
+    }
+
     /// The scene of these fields, overridden by the flags.
     pub fn scene_over(&self, file: SceneFields) -> anyhow::Result<Scene> {
         let channels = self.channels.over(file.channels.unwrap_or_default())?;
@@ -145,7 +155,8 @@ impl SceneFlags {
             aspect: self.aspect,
             seed: self.seed,
             start: self.start.clone(),
-            file: self.file.clone(),
+            // A scene is text. What of a name is none is replaced in it; see `file_unlike_text`.
+            file: (self.file.as_ref()).map(|path| path.to_string_lossy().into_owned()),
             line_tension: self.line_tension,
             threshold: self.threshold,
             steps: self.steps,

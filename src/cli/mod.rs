@@ -26,7 +26,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0  done, and the verdict is good (converged; replay agrees)
   1  could not be done: I/O, a damaged file, a numerical failure, an interruption
-  2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way
+  2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way or is being written
   3  done, and the verdict is bad (not converged within the step limit; replay differs; forces out of balance)";
 
 /// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
@@ -119,22 +119,30 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     {
         return 2;
     }
-    if let Some(FigureError::Name { .. } | FigureError::Nothing(_)) =
-        error.downcast_ref::<FigureError>()
-    {
-        return 2;
+    let file = |e: &RecordError| {
+        let is_in_the_way = matches!(
+            e,
+            RecordError::Exists { .. }
+                | RecordError::Busy { .. }
+                | RecordError::Input { .. }
+                | RecordError::Twice { .. }
+        );
+        if is_in_the_way { 2 } else { 1 }
+    };
+    if let Some(ConvertError::Write(e)) = error.downcast_ref::<ConvertError>() {
+        return file(e);
+    }
+    match error.downcast_ref::<FigureError>() {
+        Some(FigureError::Name { .. } | FigureError::Nothing(_)) => return 2,
+        Some(FigureError::File(e)) => return file(e),
+        _ => {}
     }
     match (
         error.downcast_ref::<RelaxError>(),
         error.downcast_ref::<RecordError>(),
     ) {
         (Some(RelaxError::Scene(e)), _) => scene(e),
-        (
-            _,
-            Some(
-                RecordError::Exists { .. } | RecordError::Input { .. } | RecordError::Twice { .. },
-            ),
-        ) => 2,
+        (_, Some(e)) => file(e),
         _ => 1,
     }
 }

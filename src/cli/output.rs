@@ -1,6 +1,7 @@
 //! Files that a verb writes: whether they can be, before minutes are spent on what to write.
 
-use softjam::record::{Format, RecordError};
+use super::warn;
+use softjam::record::{self, Format, NewFile, RecordError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -37,24 +38,39 @@ impl Output {
             let problem = format!("there is no folder {}", folder.display());
             return Err(create(io::ErrorKind::NotFound, problem));
         }
-        if !self.path.exists() {
-            return Ok(());
+        let part = record::part_of(&self.path);
+        for input in inputs.iter().flatten() {
+            if record::same_file(input, &self.path) {
+                return Err(RecordError::Input { path });
+            }
+            // What a killed process has left would be overwritten while it is read.
+            if record::same_file(input, &part) {
+                let path = part.display().to_string();
+                return Err(RecordError::Input { path });
+            }
         }
-        let mut inputs = inputs.iter().flatten();
-        if inputs.any(|input| same(input, &self.path)) {
-            return Err(RecordError::Input { path });
-        }
-        if force {
+        if force || !self.path.exists() {
             Ok(())
         } else {
             Err(RecordError::Exists { path })
         }
     }
+
+    /// Begins the file: nobody else can write it from now on.
+    pub fn begin(&self, force: bool) -> Result<NewFile, RecordError> {
+        NewFile::create(&self.path, force)
+    }
 }
 
-/// Whether two names are of one file.
-pub fn same(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+/// Ctrl-C and SIGTERM end the process and leave nothing of a file that is not whole.
+pub fn end_when_interrupted() -> anyhow::Result<()> {
+    ctrlc::set_handler(|| {
+        record::abandon_new_files(|| {
+            warn("interrupted; no file was made or replaced");
+            std::process::exit(1);
+        });
+    })?;
+    Ok(())
 }
 
 /// How to look at a file.

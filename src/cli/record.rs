@@ -2,7 +2,7 @@
 
 use super::flags::{RECORDING, RELAXATION, SceneFlags};
 use super::live::LiveFlags;
-use super::output::{Output, open_with, same};
+use super::output::{Output, open_with};
 use super::{Verdict, print, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::droplet::validity::Validity;
@@ -12,7 +12,7 @@ use softjam::packing::Packing;
 use softjam::record::{self, Format, Header, RecordError, Summary, Writer};
 use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
-use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start};
+use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
 use softjam::threads;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -32,6 +32,10 @@ Examples:
   softjam record --particles 1024 --spawn           and look on
   softjam record --file mine.csv -o mine.rrd        a packing of your own, relaxed as it stands
 Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd
+
+RUN.rrd is written as RUN.rrd.part until it holds its first state, and then takes its place: from then on it can be read, and gone
+on from with --from if the run is killed, which loses a second or less. What a run that was killed before (kill -9) has left as
+RUN.rrd.part the next one takes over.
 
 Exit codes: 0 converged, 1 could not be done or interrupted (the file is readable up to the last step), 2 the request makes no
 sense, 3 not converged within --steps")]
@@ -68,7 +72,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2), help_heading = RELAXATION)]
     threads: u8,
 
-    /// Replace an existing file.
+    /// Replace an existing file, as soon as the first state is recorded: until then it is as it was, and a run that fails before
+    /// leaves it so.
     #[arg(long, short, help_heading = RECORDING)]
     force: bool,
 
@@ -82,7 +87,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 
 fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let origin = match &arguments.from {
-        None => Origin::Scene(arguments.scene.scene()?.pinned()?),
+        None => match arguments.scene.file_unlike_text() {
+            None => Origin::Scene(arguments.scene.scene()?.pinned()?),
+            Some(path) => {
+                let scene = arguments.scene.scene()?;
+                let (start, packing) = start::from_file(path)?;
+                Origin::Packing(Scene { start, ..scene }, packing)
+            }
+        },
         Some(path) => recorded_frame(path, arguments)?,
     };
     let scene = origin.scene().clone();
@@ -103,17 +115,20 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
         ));
     }
     let phase = Phase::watch_for_signals()?;
+    // Whoever cannot have a file hears of it before the disks relax.
+    let files = outputs.iter().map(|output| output.begin(arguments.force));
+    let files = files.collect::<Result<Vec<_>, _>>()?;
 
     let start = Instant::now();
     let mut run = match origin {
         Origin::Scene(scene) => Relaxation::new(&scene)?,
+        Origin::Packing(scene, packing) => Relaxation::of_packing(&scene, packing)?,
         Origin::Frame(scene, packing, frame) => Relaxation::resume(&scene, packing, *frame)?,
     };
     let disks = start.elapsed();
     let header = Header::of(&scene, &run);
-    let writers = outputs.iter().map(|output| {
-        Writer::create_as(output.format, &output.path, arguments.force, header.clone())
-    });
+    let writers = outputs.iter().zip(files);
+    let writers = writers.map(|(output, file)| Writer::start(output.format, file, header.clone()));
     let writers = writers.collect::<Result<Vec<_>, _>>()?;
     let live = arguments.live.start(&header);
     phase.recording();
@@ -150,7 +165,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
 fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordError> {
     let mut outputs: Vec<Output> = arguments.output.iter().map(|p| Output::named(p)).collect();
     if let Some(path) = &arguments.mcap {
-        if outputs.iter().any(|other| same(&other.path, path)) {
+        if outputs.iter().any(|o| record::same_file(&o.path, path)) {
             let path = path.display().to_string();
             return Err(RecordError::Twice { path });
         }
@@ -163,7 +178,7 @@ fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordEr
         outputs.push(Output::named(Path::new("softjam.rrd")));
     }
     let start = match &scene.start {
-        Start::File { path, .. } => Some(Path::new(path)),
+        Start::File { path, .. } => arguments.scene.file().or(Some(Path::new(path))),
         Start::Random | Start::Hexagonal => None,
     };
     let inputs = [arguments.from.as_deref(), start, arguments.scene.path()];
@@ -190,12 +205,14 @@ impl Phase {
         ctrlc::set_handler(move || {
             let again = seen.interrupted.swap(true, Ordering::Relaxed);
             if again || !seen.recording.load(Ordering::Relaxed) {
-                warn(if again {
-                    "aborted"
-                } else {
-                    "interrupted before the first frame; no file was written"
+                record::abandon_new_files(|| {
+                    warn(if again {
+                        "aborted"
+                    } else {
+                        "interrupted before the first frame; no file was made or replaced"
+                    });
+                    std::process::exit(1);
                 });
-                std::process::exit(1);
             }
             warn(
                 "ending behind this step; once more to abort, which may leave the file without its last steps",
@@ -216,13 +233,14 @@ impl Phase {
 /// Where a run begins.
 enum Origin {
     Scene(Scene),
+    Packing(Scene, Packing),
     Frame(Scene, Packing, Box<Frame>),
 }
 
 impl Origin {
     fn scene(&self) -> &Scene {
         match self {
-            Self::Scene(scene) | Self::Frame(scene, ..) => scene,
+            Self::Scene(scene) | Self::Packing(scene, _) | Self::Frame(scene, ..) => scene,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `softjam scene`: prints a scene file.
 
 use super::{Verdict, flags::SceneFlags, print};
+use softjam::scene::SceneError;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -16,6 +17,14 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    if let Some(path) = arguments.scene.file_unlike_text() {
+        return Err(SceneError::Range {
+            field: "file".to_owned(),
+            value: path.display().to_string(),
+            allowed: "a name in UTF-8, since a scene file is text; rename the file".to_owned(),
+        }
+        .into());
+    }
     print(&arguments.scene.scene()?.to_toml())?;
     Ok(Verdict::Good)
 }

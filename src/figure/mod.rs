@@ -23,8 +23,10 @@ pub use chart::{Axis, CURVE_COLORS, Curve, Mark, Scale, chart};
 pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation};
 
+use crate::record::{NewFile, RecordError};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
+use std::io::Write as _;
 use std::path::Path;
 
 /// The typeface of all figures.
@@ -57,6 +59,9 @@ pub enum FigureError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The file could not be begun.
+    #[error(transparent)]
+    File(#[from] RecordError),
     /// The picture could not be drawn.
     #[error("the figure cannot be drawn: {0}")]
     Draw(String),
@@ -90,23 +95,51 @@ fn is_png(path: &Path) -> Result<bool, FigureError> {
     }
 }
 
-/// Writes a figure as its name says, `.svg` or `.png`.
+/// Writes a figure as its name says, `.svg` or `.png`; an existing file is replaced when the new one is whole.
 ///
 /// # Errors
 ///
-/// [`FigureError`].
+/// [`FigureError`]; an existing file is then as it was.
 ///
 /// See the example of the [module](self).
 pub fn write(path: impl AsRef<Path>, svg: &str) -> Result<(), FigureError> {
-    let path = path.as_ref();
+    check_name(&path)?;
+    write_into(NewFile::create(path, true)?, svg)
+}
+
+/// [`write()`] into a file that has been begun.
+///
+/// # Errors
+///
+/// [`FigureError`]; nothing is left of the file then.
+///
+/// ```
+/// use softjam::{figure, record::NewFile};
+///
+/// let path = std::env::temp_dir().join("softjam-figure-write-into-example.svg");
+/// let file = NewFile::create(&path, true).unwrap();
+/// figure::write_into(file, "<svg xmlns='http://www.w3.org/2000/svg' width='10' height='10'/>").unwrap();
+/// assert!(path.exists());
+/// # std::fs::remove_file(&path).unwrap();
+/// ```
+pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
+    let path = file.path().to_owned();
+    let path = path.as_path();
     let bytes = if is_png(path)? {
         png(svg)?
     } else {
         svg.as_bytes().to_vec()
     };
-    std::fs::write(path, bytes).map_err(|source| FigureError::Write {
-        path: path.display().to_string(),
-        source,
+    let written = file.write_all(&bytes).and_then(|()| file.publish());
+    written.map_err(|source| match source.kind() {
+        // It has come there since the file was begun.
+        std::io::ErrorKind::AlreadyExists => FigureError::File(RecordError::Exists {
+            path: path.display().to_string(),
+        }),
+        _ => FigureError::Write {
+            path: path.display().to_string(),
+            source,
+        },
     })
 }
 

@@ -19,6 +19,7 @@ use super::messages::{
     ABOUT, DESCRIPTORS, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS,
     StateMessage, topic,
 };
+use super::patience::Patience;
 use super::pictures::Network;
 use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
@@ -38,8 +39,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// A chunk is closed when it holds this many bytes or snapshots, or when the steps since it was begun have cost so many
-/// moves of a particle: a quarter of a second or so, whatever is recorded, and the same in every run.
+/// A chunk is closed when it holds this many bytes or snapshots, or when the steps up to the next snapshot come to so many moves of
+/// a particle: some 40 ms, whatever is recorded, and the same in every run. The first snapshot has a chunk of its own.
 const CHUNK_BYTES: usize = 1 << 20;
 const CHUNK_SNAPSHOTS: usize = 512;
 const CHUNK_MOVES: u64 = 400_000;
@@ -74,6 +75,7 @@ pub struct McapRecorder<W: Write> {
     line_tension: f64,
     contours: Contours,
     redraw: Redraw,
+    patience: Patience,
     message: Vec<u8>,
     chunk: Chunk,
     intact: Option<u64>,
@@ -149,6 +151,7 @@ impl<W: Write> McapRecorder<W> {
             line_tension: header.scene.line_tension,
             contours: Contours::new(header.scene.contours),
             redraw: Redraw::new(&header),
+            patience: Patience::of(&header, CHUNK_MOVES),
             packing: header.packing,
             topics,
             message: Vec::new(),
@@ -244,10 +247,11 @@ impl<W: Write> Recorder for McapRecorder<W> {
         let chunk = &mut self.chunk;
         chunk.snapshots += 1;
         chunk.last = Some(step);
-        let steps = step.saturating_sub(*chunk.first.get_or_insert(step)) + 1;
-        if chunk.bytes >= CHUNK_BYTES
+        let first = *chunk.first.get_or_insert(step);
+        if self.intact.is_none()
+            || chunk.bytes >= CHUNK_BYTES
             || chunk.snapshots >= CHUNK_SNAPSHOTS
-            || steps.saturating_mul(self.packing.len() as u64) >= CHUNK_MOVES
+            || self.patience.ends(first, step)
         {
             self.flush()?;
         }

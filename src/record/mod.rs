@@ -3,7 +3,8 @@
 //! A run is recorded as a sequence of [`Snapshot`]s: a step, what is recorded of it, and nothing else. What no channel
 //! asks for is not computed. A [`Recorder`] turns snapshots into a file: [`RrdRecorder`] for the rerun viewer,
 //! [`McapRecorder`] for Foxglove and everything else that reads MCAP. [`Writer`] runs one on a thread of its own behind a
-//! bounded queue; when it fails, the next snapshot fails with it, so that a full disk ends the run instead of emptying it.
+//! bounded queue; when it fails, the next snapshot fails with it, so that a full disk ends the run instead of emptying it. The file
+//! is a [`NewFile`], which takes its place with the first snapshot: a file under its own name holds a state.
 //!
 //! ```
 //! use softjam::{record, relax::Relaxation, scene::Scene};
@@ -21,6 +22,7 @@ mod blueprint;
 mod cells;
 mod columns;
 mod encode;
+mod file;
 mod header;
 mod hover;
 mod images;
@@ -30,6 +32,7 @@ mod live;
 mod mcap;
 mod memory;
 pub(crate) mod messages;
+mod patience;
 mod pictures;
 mod pipeline;
 mod redraw;
@@ -41,6 +44,7 @@ mod snapshot;
 mod states;
 mod writer;
 
+pub use file::{NewFile, abandon_new_files, part_of, same_file};
 pub use live::{Ended, Live, LiveError, Shown, Viewer};
 pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
@@ -250,6 +254,16 @@ pub enum RecordError {
         /// Path of the file.
         path: String,
     },
+    /// Somebody else is writing the file.
+    #[error(
+        "{path} is being written by another softjam ({locked} is locked); wait for it, or name another file"
+    )]
+    Busy {
+        /// Path of the file.
+        path: String,
+        /// The file whose lock the other holds.
+        locked: String,
+    },
     /// The file is one that the run reads from.
     #[error("{path} is what is read from; name another file to write")]
     Input {
@@ -280,7 +294,7 @@ pub enum RecordError {
         path: String,
         /// The step at which writing failed.
         step: u64,
-        /// The last step that is whole in the file.
+        /// The last step that is whole in the file; `None` if there is no new file.
         intact: Option<u64>,
         /// The system's reason.
         source: std::io::Error,
@@ -293,7 +307,7 @@ pub enum RecordError {
 fn recorded_up_to(intact: Option<u64>) -> String {
     match intact {
         Some(step) => format!("the recording is whole up to step {step}"),
-        None => "no step is in the recording".to_owned(),
+        None => "no step is recorded, and no file was made or replaced".to_owned(),
     }
 }
 

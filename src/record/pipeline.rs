@@ -2,9 +2,11 @@
 
 use super::rows::{Batch, Rows};
 use super::rrd::Chunks;
+use super::writer::Place;
 use super::{Header, Outcome, Recorder, RrdRecorder, Snapshot, Written};
 use std::fs::File;
 use std::io;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
@@ -28,14 +30,14 @@ enum Order {
 type End = (io::Result<Written>, Option<u64>, u64);
 
 impl Pipeline {
-    /// Starts a recording in `file`.
-    pub fn new(file: File, header: Header) -> io::Result<Self> {
+    /// Starts a recording in `file`; `place` is told when the first of it has been written.
+    pub fn new(file: File, header: Header, place: Arc<Place>) -> io::Result<Self> {
         let (rows, chunks) = RrdRecorder::new(file, header)?.split();
         // One batch is drawn, one waits at most, one is written.
         let (orders, work) = sync_channel(1);
         let thread = std::thread::Builder::new()
             .name("softjam-writer".to_owned())
-            .spawn(move || write(chunks, &work))?;
+            .spawn(move || write(chunks, &place, &work))?;
         Ok(Self {
             rows,
             writer: Some((orders, thread)),
@@ -97,12 +99,17 @@ impl Recorder for Pipeline {
 }
 
 /// The thread's work.
-fn write(mut chunks: Chunks<File>, work: &Receiver<Order>) -> End {
+fn write(mut chunks: Chunks<File>, place: &Place, work: &Receiver<Order>) -> End {
     let mut result = Ok(Written::default());
     while result.is_ok() {
         match work.recv() {
             Ok(Order::Write(batch)) => {
-                result = chunks.write(*batch).map(|()| Written::default());
+                result = chunks.write(*batch).and_then(|()| {
+                    if chunks.intact().is_some() {
+                        place.first_is_written()?;
+                    }
+                    Ok(Written::default())
+                });
             }
             Ok(Order::Finish(outcome, states)) => {
                 result = chunks.finish(outcome, states);

@@ -3,6 +3,7 @@
 use super::columns::StripRows;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
+use super::patience::Patience;
 use super::pictures::{Network, Particles};
 use super::redraw::Redraw;
 use super::states::StateRows;
@@ -14,12 +15,14 @@ use crate::frame::Frame;
 use crate::packing::Packing;
 
 /// A batch is written when it holds this many bytes (twice as many if they are but a few snapshots, for each chunk costs time whatever
-/// it holds) or snapshots, or when it has come to span so many steps: a run that is killed loses no more than two batches and what
-/// waits for them.
+/// it holds) or snapshots, when it has come to span so many steps, or when the steps up to the next snapshot come to so many moves of
+/// a particle, which is some 0.4 s: a run that is killed loses no more than two batches and what waits for them. The first
+/// snapshot is a batch of its own, so that from then on there is a state to go on from.
 const BATCH_BYTES: usize = 1 << 22;
 const FEW_SNAPSHOTS: usize = 16;
 const BATCH_SNAPSHOTS: usize = 512;
 const BATCH_SPAN: u64 = 2048;
+const BATCH_MOVES: u64 = 4_000_000;
 
 /// Turns snapshots into batches of rows.
 pub(super) struct Rows {
@@ -27,6 +30,9 @@ pub(super) struct Rows {
     line_tension: f64,
     contours: Contours,
     redraw: Redraw,
+    patience: Patience,
+    /// Whether there was a batch.
+    begun: bool,
     pending: Batch,
     states: u64,
     digests: blake3::Hasher,
@@ -60,6 +66,8 @@ impl Rows {
             line_tension: header.scene.line_tension,
             contours: Contours::new(header.scene.contours),
             redraw: Redraw::new(&header),
+            patience: Patience::of(&header, BATCH_MOVES),
+            begun: false,
             packing: header.packing,
             pending: Batch::default(),
             states: 0,
@@ -84,9 +92,12 @@ impl Rows {
         pending.last = Some(snapshot.step);
         let first = *pending.first.get_or_insert(snapshot.step);
         let few = pending.snapshots < FEW_SNAPSHOTS;
-        let whole = pending.bytes >= BATCH_BYTES * if few { 2 } else { 1 }
+        let whole = !self.begun
+            || pending.bytes >= BATCH_BYTES * if few { 2 } else { 1 }
             || pending.snapshots >= BATCH_SNAPSHOTS
-            || snapshot.step.saturating_sub(first) >= BATCH_SPAN;
+            || snapshot.step.saturating_sub(first) >= BATCH_SPAN
+            || self.patience.ends(first, snapshot.step);
+        self.begun = true;
         whole.then(|| self.batch())
     }
 

@@ -1,12 +1,14 @@
 //! The thread that encodes and writes, behind a bounded queue.
 
+use super::patience::Patience;
 use super::pipeline::Pipeline;
-use super::{Format, Header, McapRecorder, Outcome, RecordError, Recorder, Snapshot};
+use super::{Format, Header, McapRecorder, NewFile, Outcome, RecordError, Recorder, Snapshot};
 use crate::frame::Frame;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
@@ -16,10 +18,11 @@ use std::thread::JoinHandle;
 const QUEUE: usize = 8;
 const QUEUE_BYTES: usize = 1 << 25;
 
-/// Snapshots are handed over together until they span so many steps, or their frames hold so many bytes: waking the thread costs
-/// more than the metrics of a step.
+/// Snapshots are handed over together until they span so many steps, their frames hold so many bytes, or the steps up to the next have
+/// come to so many moves of a particle (some 30 ms): waking the thread costs more than the metrics of a step. The first goes at once.
 const TOGETHER: u64 = 64;
 const TOGETHER_BYTES: usize = 1 << 19;
+const TOGETHER_MOVES: u64 = 300_000;
 
 /// How far threads that draw and write step back behind the run.
 #[cfg(target_os = "linux")]
@@ -36,7 +39,29 @@ pub struct Writer {
     thread: Option<JoinHandle<Result<Written, Failure>>>,
     /// Snapshots not yet handed over.
     held: Vec<Arc<Snapshot>>,
+    patience: Patience,
+    /// Whether the first has been handed over.
+    begun: bool,
+    place: Arc<Place>,
     path: String,
+}
+
+/// The file that is written, and when it takes its place.
+#[derive(Debug)]
+pub(super) struct Place {
+    file: NewFile,
+    /// Whether it waits for the last snapshot; else it goes with the first.
+    last: AtomicBool,
+}
+
+impl Place {
+    /// What is recorded first has been written.
+    pub fn first_is_written(&self) -> io::Result<()> {
+        if self.last.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        self.file.publish()
+    }
 }
 
 /// What was written.
@@ -67,11 +92,11 @@ struct Failure {
 
 impl Writer {
     /// Creates the file of a recording, in the [format that its name says](Format::of), and starts it; an existing file is
-    /// replaced only if `replace` says so.
+    /// replaced only if `replace` says so, and not before the first snapshot has been written.
     ///
     /// # Errors
     ///
-    /// [`RecordError::Exists`] or [`RecordError::Create`].
+    /// Those of [`NewFile::create`].
     ///
     /// ```
     /// use softjam::{record::{Header, Writer}, relax::Relaxation, scene::Scene};
@@ -94,7 +119,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// [`RecordError::Exists`] or [`RecordError::Create`].
+    /// Those of [`NewFile::create`].
     ///
     /// See the example of [`create`](Self::create).
     pub fn create_as(
@@ -103,22 +128,39 @@ impl Writer {
         replace: bool,
         header: Header,
     ) -> Result<Self, RecordError> {
-        let path = path.as_ref();
-        let name = path.display().to_string();
-        let mut options = OpenOptions::new();
-        options.write(true);
-        if replace {
-            options.create(true).truncate(true);
-        } else {
-            options.create_new(true);
-        }
-        let file = options.open(path).map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => RecordError::Exists { path: name.clone() },
-            _ => RecordError::Create {
-                path: name.clone(),
-                source,
-            },
-        })?;
+        Self::start(format, NewFile::create(path, replace)?, header)
+    }
+
+    /// Starts a recording in a file that has been begun.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Create`] if the system has no threads left.
+    ///
+    /// ```
+    /// use softjam::{record::{Format, Header, NewFile, Writer}, relax::Relaxation, scene::Scene};
+    ///
+    /// let path = std::env::temp_dir().join("softjam-writer-start-example.rrd");
+    /// // Whoever cannot have the file hears of it before the disks relax.
+    /// let file = NewFile::create(&path, true).unwrap();
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// Writer::start(Format::Rrd, file, Header::of(&scene, &run)).unwrap().finish(None).unwrap();
+    /// assert!(path.exists());
+    /// # std::fs::remove_file(&path).unwrap();
+    /// ```
+    pub fn start(format: Format, file: NewFile, header: Header) -> Result<Self, RecordError> {
+        let name = file.path().display().to_string();
+        let fails = |source| RecordError::Create {
+            path: name.clone(),
+            source,
+        };
+        let sink = file.open_file().map_err(fails)?;
+        let place = Arc::new(Place {
+            file,
+            last: AtomicBool::new(false),
+        });
+        let patience = Patience::of(&header, TOGETHER_MOVES);
         // What a frame holds of each particle, with 2.5 contacts.
         let frame = 72 * header.packing.len();
         let room = match format {
@@ -128,20 +170,32 @@ impl Writer {
         let (queue, messages) = sync_channel(room);
         let thread = std::thread::Builder::new()
             .name("softjam-recorder".to_owned())
-            .spawn(move || match format {
-                Format::Rrd => write(file, &messages, |file| Pipeline::new(file, header)),
-                Format::Mcap => write(file, &messages, |file| McapRecorder::new(file, header)),
+            .spawn({
+                let place = Arc::clone(&place);
+                move || match format {
+                    Format::Rrd => write(sink, &place, &messages, |sink| {
+                        Pipeline::new(sink, header, Arc::clone(&place))
+                    }),
+                    Format::Mcap => write(sink, &place, &messages, |sink| {
+                        McapRecorder::new(sink, header)
+                    }),
+                }
             })
-            .map_err(|source| RecordError::Create {
-                path: name.clone(),
-                source,
-            })?;
+            .map_err(fails)?;
         Ok(Self {
             queue: Some(queue),
             thread: Some(thread),
             held: Vec::new(),
+            patience,
+            begun: false,
+            place,
             path: name,
         })
+    }
+
+    /// Lets the file take its place when it is whole, and not with the first snapshot.
+    pub(crate) fn wait_until_whole(&self) {
+        self.place.last.store(true, Ordering::Relaxed);
     }
 
     /// Hands a snapshot to the thread, small ones some at a time; waits while the queue is full.
@@ -153,15 +207,20 @@ impl Writer {
     /// See the example of the [module](super).
     pub fn send(&mut self, snapshot: impl Into<Arc<Snapshot>>) -> Result<(), RecordError> {
         let snapshot = snapshot.into();
-        let first = self.held.first().map_or(snapshot.step, |held| held.step);
-        let spans = snapshot.step.saturating_sub(first);
+        let step = snapshot.step;
+        let first = self.held.first().map_or(step, |held| held.step);
+        let spans = step.saturating_sub(first);
         self.held.push(snapshot);
         let frames = self.held.iter().filter_map(|held| held.frame.as_ref());
         let bytes: usize = frames.map(Frame::bytes).sum();
-        let waits = bytes < TOGETHER_BYTES && spans < TOGETHER;
+        let waits = self.begun
+            && bytes < TOGETHER_BYTES
+            && spans < TOGETHER
+            && !self.patience.ends(first, step);
         if waits {
             return Ok(());
         }
+        self.begun = true;
         self.hand_over()
     }
 
@@ -204,16 +263,23 @@ impl Writer {
             Some(Err(panic)) => std::panic::resume_unwind(panic),
             None => Err(lost()),
         };
-        result.map_err(|failure| RecordError::Write {
-            path: self.path.clone(),
-            step: failure.step,
-            intact: failure.intact,
-            source: failure.source,
+        result.map_err(|failure| match failure.source.kind() {
+            // It has come there since the recording was begun.
+            io::ErrorKind::AlreadyExists => RecordError::Exists {
+                path: self.path.clone(),
+            },
+            _ => RecordError::Write {
+                path: self.path.clone(),
+                step: failure.step,
+                intact: failure.intact,
+                source: failure.source,
+            },
         })
     }
 }
 
-/// A writer that is dropped without [`Writer::finish`] leaves what it was given, unfinished but readable.
+/// A writer that is dropped without [`Writer::finish`] leaves what it was given, unfinished but readable; where it was given nothing,
+/// there is no new file.
 impl Drop for Writer {
     fn drop(&mut self) {
         if let Some(queue) = self.queue.take() {
@@ -240,7 +306,8 @@ fn step_back() {
 
 /// The thread's work.
 fn write<R: Recorder>(
-    file: File,
+    sink: File,
+    place: &Place,
     messages: &Receiver<Message>,
     start_recorder: impl FnOnce(File) -> io::Result<R>,
 ) -> Result<Written, Failure> {
@@ -250,24 +317,25 @@ fn write<R: Recorder>(
         intact: None,
         source,
     };
-    let cut = file.try_clone().map_err(start)?;
+    let cut = sink.try_clone().map_err(start)?;
     step_back();
-    let mut recorder = start_recorder(file).map_err(|source| {
-        drop(cut.set_len(0));
-        start(source)
-    })?;
-    let mut outcome = None;
+    let mut recorder = start_recorder(sink).map_err(start)?;
+    // What the run came to; `None` if nobody has said that it is over.
+    let mut end = None;
     let mut result = Ok(());
     while result.is_ok() {
         match messages.recv() {
             Ok(Message::Snapshots(snapshots)) => {
                 result = snapshots.iter().try_for_each(|snapshot| {
                     step = snapshot.step;
-                    recorder.record(snapshot)
+                    recorder.record(snapshot)?;
+                    recorder
+                        .intact()
+                        .map_or(Ok(()), |_| place.first_is_written())
                 });
             }
-            Ok(Message::Finish(end)) => {
-                outcome = end;
+            Ok(Message::Finish(outcome)) => {
+                end = Some(outcome);
                 break;
             }
             Err(_) => break,
@@ -275,19 +343,25 @@ fn write<R: Recorder>(
     }
     result
         .and_then(|()| {
-            let written = recorder.finish(outcome)?;
+            let written = recorder.finish(end.flatten())?;
             match cut.sync_data() {
                 // Pipes and devices have nothing to bring to the disk.
-                Err(e) if e.kind() != io::ErrorKind::InvalidInput => Err(e),
-                _ => Ok(written),
+                Err(e) if e.kind() != io::ErrorKind::InvalidInput => return Err(e),
+                _ => {}
             }
+            if end.is_some() {
+                place.file.publish()?;
+            } else if recorder.intact().is_some() {
+                place.first_is_written()?;
+            }
+            Ok(written)
         })
         .map_err(|source| {
             // A message that reached the disk in part would be a torn end. What is no file cannot be cut, and need not be.
             drop(cut.set_len(recorder.written()));
             Failure {
                 step,
-                intact: recorder.intact(),
+                intact: recorder.intact().filter(|_| place.file.is_published()),
                 source,
             }
         })

@@ -85,6 +85,9 @@ impl Recording {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let name = path.as_ref().display().to_string();
         let open = |path: &Path| {
+            // Before it is opened: a pipe would wait for its other end.
+            let found = std::fs::metadata(path)?;
+            is_regular(found.file_type())?;
             let file = File::open(path)?;
             let length = file.metadata()?.len();
             Ok((file, length))
@@ -434,6 +437,32 @@ impl Recording {
         self.outcome = Some(outcome);
         Ok(Event::Result { outcome, digest })
     }
+}
+
+/// Refuses what has no length that could be relied on.
+fn is_regular(kind: std::fs::FileType) -> std::io::Result<()> {
+    if kind.is_file() {
+        return Ok(());
+    }
+    let what = if kind.is_dir() {
+        "it is a folder; name a file in it"
+    } else if is_pipe(kind) {
+        "it is a pipe, and a recording is read from a file; save it first, as with `cat > run.rrd`"
+    } else {
+        "it is a device, and a recording is read from a file"
+    };
+    Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, what))
+}
+
+#[cfg(unix)]
+fn is_pipe(kind: std::fs::FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    kind.is_fifo() || kind.is_socket()
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: std::fs::FileType) -> bool {
+    false
 }
 
 /// The events, until the end or the first damage.

@@ -344,7 +344,7 @@ impl Scene {
             blake3: hash @ None,
         } = &mut self.start
         {
-            let bytes = start_file::read_file(path)?;
+            let bytes = start_file::read_file(path.as_ref())?;
             *hash = Some(blake3::hash(&bytes).to_hex().to_string());
         }
         Ok(self)

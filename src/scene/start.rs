@@ -8,7 +8,7 @@
 //! curve (G. M. Morton, IBM Ltd., 1966), so that particles near each other have numbers near each other and stand near
 //! each other in memory. Numbers mean nothing to the physics.
 
-pub use super::start_file::read_csv;
+pub use super::start_file::{from_file, read_csv};
 
 use super::{Radii, Scene, SceneError, Species, Start, start_file};
 use crate::domain::{Domain, Vec2};
@@ -34,7 +34,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// ```
 pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
     let (packing, aspect) = match &scene.start {
-        Start::File { path, blake3 } => return start_file::of_scene(path, blake3.as_deref()),
+        Start::File { path, blake3 } => {
+            return start_file::of_scene(path.as_ref(), blake3.as_deref());
+        }
         Start::Random => {
             let mut random = Random::new(scene.seed);
             let radii = radii(scene, &mut random);

@@ -1,18 +1,52 @@
 //! A packing from a CSV file.
 
-use super::SceneError;
 use super::start::is_small;
+use super::{SceneError, Start};
 use crate::domain::{Domain, Vec2};
 use crate::packing::{Packing, PackingError};
 use std::io::Read as _;
+use std::path::Path;
 
 /// The packing that a scene starts from, if it starts from a file.
 ///
 /// # Errors
 ///
 /// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic.
-pub(super) fn of_scene(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
-    let packing = read_csv(path, blake3)?;
+pub(super) fn of_scene(path: &Path, blake3: Option<&str>) -> Result<Packing, SceneError> {
+    packing_of(path, &read_file(path)?, blake3)
+}
+
+/// A start from a file, and its packing. The file is pinned by its BLAKE3, so any name will do: what of it is no text (UTF-8) is
+/// replaced in the scene's.
+///
+/// # Errors
+///
+/// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic.
+///
+/// ```
+/// use softjam::scene::{Start, start};
+///
+/// let path = std::env::temp_dir().join("softjam-start-from-file-example.csv");
+/// std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n2,1,0.7\n").unwrap();
+/// let (start, packing) = start::from_file(&path).unwrap();
+/// assert!(matches!(start, Start::File { blake3: Some(_), .. }));
+/// assert_eq!(packing.len(), 2);
+/// # std::fs::remove_file(&path).unwrap();
+/// ```
+pub fn from_file(path: impl AsRef<Path>) -> Result<(Start, Packing), SceneError> {
+    let path = path.as_ref();
+    let bytes = read_file(path)?;
+    let packing = packing_of(path, &bytes, None)?;
+    let start = Start::File {
+        path: path.to_string_lossy().into_owned(),
+        blake3: Some(blake3::hash(&bytes).to_hex().to_string()),
+    };
+    Ok((start, packing))
+}
+
+/// The packing in a file of these bytes, if it can be started from.
+fn packing_of(path: &Path, bytes: &[u8], blake3: Option<&str>) -> Result<Packing, SceneError> {
+    let packing = checked(path, bytes, blake3)?;
     if is_small(&packing) {
         let l = packing.domain().lengths();
         let problem = format!(
@@ -22,9 +56,8 @@ pub(super) fn of_scene(path: &str, blake3: Option<&str>) -> Result<Packing, Scen
             l.y,
             packing.largest_radius()
         );
-        let path = path.into();
         return Err(SceneError::StartFile {
-            path,
+            path: path.display().to_string(),
             line: 0,
             problem,
         });
@@ -56,21 +89,26 @@ pub(super) fn of_scene(path: &str, blake3: Option<&str>) -> Result<Packing, Scen
 ///
 /// let path = std::env::temp_dir().join("softjam-read-csv-example.csv");
 /// std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n2,1,0.7\n").unwrap();
-/// let packing = read_csv(path.to_str().unwrap(), None).unwrap();
+/// let packing = read_csv(&path, None).unwrap();
 /// assert_eq!(packing.radii(), [0.5, 0.7]);
 /// # std::fs::remove_file(&path).unwrap();
 /// ```
-pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
-    let bytes = read_file(path)?;
+pub fn read_csv(path: impl AsRef<Path>, blake3: Option<&str>) -> Result<Packing, SceneError> {
+    let path = path.as_ref();
+    checked(path, &read_file(path)?, blake3)
+}
+
+/// The packing in a file of these bytes, which must have the BLAKE3 that is asked for.
+fn checked(path: &Path, bytes: &[u8], blake3: Option<&str>) -> Result<Packing, SceneError> {
     let wrong = |line: u64, problem: String| SceneError::StartFile {
-        path: path.into(),
+        path: path.display().to_string(),
         line,
         problem,
     };
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(wrong(0, format!("it is longer than {LARGEST_FILE} bytes")));
     }
-    let found = blake3::hash(&bytes).to_hex();
+    let found = blake3::hash(bytes).to_hex();
     if let Some(asked) = blake3
         && !asked.eq_ignore_ascii_case(&found)
     {
@@ -81,7 +119,7 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
             ),
         ));
     }
-    let text = str::from_utf8(&bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
+    let text = str::from_utf8(bytes).map_err(|e| wrong(0, format!("not UTF-8 text: {e}")))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     parse(text).map_err(|(line, problem)| wrong(line, problem))
 }
@@ -140,12 +178,12 @@ fn reader(text: &str) -> csv::Reader<&[u8]> {
 const LARGEST_FILE: u64 = 1 << 30;
 
 /// The bytes of a start file, one more than [`LARGEST_FILE`] at most.
-pub(super) fn read_file(path: &str) -> Result<Vec<u8>, SceneError> {
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|source| SceneError::Read {
-            path: path.into(),
+            path: path.display().to_string(),
             source,
         })?;
     Ok(bytes)

@@ -1,6 +1,8 @@
 //! The program at its process boundary: exit codes, files, messages.
 
 mod convert;
+#[cfg(unix)]
+mod files;
 mod help;
 mod live;
 mod replay;
