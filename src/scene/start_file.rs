@@ -2,15 +2,17 @@
 
 use super::SceneError;
 use super::start::is_small;
+use crate::crowding;
 use crate::domain::{Domain, Vec2};
 use crate::packing::{Packing, PackingError};
+use crate::text::shown;
 use std::io::Read as _;
 
 /// The packing that a scene starts from, if it starts from a file.
 ///
 /// # Errors
 ///
-/// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic.
+/// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic or particles lie on each other.
 pub(super) fn of_scene(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError> {
     let packing = read_csv(path, blake3)?;
     if is_small(&packing) {
@@ -21,6 +23,19 @@ pub(super) fn of_scene(path: &str, blake3: Option<&str>) -> Result<Packing, Scen
             l.x,
             l.y,
             packing.largest_radius()
+        );
+        let path = path.into();
+        return Err(SceneError::StartFile {
+            path,
+            line: 0,
+            problem,
+        });
+    }
+    if let Err(crowd) = crowding::pairs(&packing) {
+        let problem = format!(
+            "{} particles overlap particle {}, where a packing has room for some dozens: nothing says in which direction they part; \
+             give each a place of its own",
+            crowd.others, crowd.particle
         );
         let path = path.into();
         return Err(SceneError::StartFile {
@@ -77,7 +92,8 @@ pub fn read_csv(path: &str, blake3: Option<&str>) -> Result<Packing, SceneError>
         return Err(wrong(
             0,
             format!(
-                "its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"
+                "its BLAKE3 is {found}, the scene asks for {}: this is not the file that the scene was made with",
+                shown(asked)
             ),
         ));
     }
@@ -139,15 +155,30 @@ fn reader(text: &str) -> csv::Reader<&[u8]> {
 /// A start file of the largest packing is about half as long.
 const LARGEST_FILE: u64 = 1 << 30;
 
+/// Bytes that are looked at before the rest is read.
+const BEGINNING: u64 = 1 << 12;
+
 /// The bytes of a start file, one more than [`LARGEST_FILE`] at most.
 pub(super) fn read_file(path: &str) -> Result<Vec<u8>, SceneError> {
+    let unreadable = |source| SceneError::Read {
+        path: path.into(),
+        source,
+    };
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(|source| SceneError::Read {
-            path: path.into(),
-            source,
-        })?;
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    // A device that never ends shows itself at once.
+    for most in [BEGINNING, LARGEST_FILE + 1 - BEGINNING] {
+        let read = file.by_ref().take(most).read_to_end(&mut bytes);
+        read.map_err(unreadable)?;
+        let beginning = bytes.iter().take(BEGINNING as usize);
+        if let Some(place) = beginning.copied().position(|byte| byte == 0) {
+            return Err(SceneError::StartFile {
+                path: path.into(),
+                line: 0,
+                problem: format!("byte {place} is 0, which no text holds"),
+            });
+        }
+    }
     Ok(bytes)
 }
 
@@ -178,16 +209,10 @@ fn line_of(text: &str, particle: usize) -> u64 {
     row(text, record.as_ref().and_then(|r| r.position())).0
 }
 
-/// The beginning of a line, fit for a terminal.
+/// The beginning of a line.
 fn quote(line: &str) -> String {
-    match line.char_indices().nth(QUOTED) {
-        Some((end, _)) => format!("`{}…`", line[..end].escape_debug()),
-        None => format!("`{}`", line.escape_debug()),
-    }
+    format!("`{}`", shown(line))
 }
-
-/// Characters of a line that a message quotes at most.
-const QUOTED: usize = 60;
 
 /// The sides of the box from the comment `# box = L_x, L_y`.
 fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
@@ -288,7 +313,5 @@ mod tests {
                 assert!(problem.chars().all(plain), "{problem:?}");
             }
         }
-        assert_eq!(quote(&"7".repeat(60)), format!("`{}`", "7".repeat(60)));
-        assert_eq!(quote(&"7".repeat(61)), format!("`{}…`", "7".repeat(60)));
     }
 }
