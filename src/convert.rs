@@ -30,9 +30,10 @@ use crate::frame::Frame;
 use crate::record::{
     Header, Outcome, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
 };
-use crate::relax::{RelaxError, Relaxation};
+use crate::relax::{RelaxError, Relaxation, Status};
 use crate::replay::{Event, ReadError, Recording};
 use crate::scene::{Channels, Scene, SceneError, Schedule};
+use crate::text::shown;
 use std::collections::BTreeMap;
 
 /// What a conversion came to.
@@ -72,8 +73,9 @@ pub enum ConvertError {
     Scene(#[from] SceneError),
     /// The channels ask for what only a state can give.
     #[error(
-        "{path} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
-         `--channels metrics` and their schedule as it is"
+        "{} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
+         `--channels metrics` and their schedule as it is",
+        shown(.path)
     )]
     NoState {
         /// Path of the recording.
@@ -81,7 +83,8 @@ pub enum ConvertError {
     },
     /// Walking the run again did not lead to the recorded frame.
     #[error(
-        "walking again from step {from} does not lead to the recorded state of step {step}: see `softjam replay {path}`"
+        "walking again from step {from} does not lead to the recorded state of step {step}: see `softjam replay {}`",
+        shown(.path)
     )]
     Differs {
         /// Path of the recording.
@@ -103,19 +106,21 @@ pub enum ConvertError {
 /// See the example of the [module](self).
 pub fn header(recording: &Recording, channels: Channels) -> Result<Header, ConvertError> {
     can_be_rebuilt(recording, &channels)?;
+    let particles = recording.radii().len();
     // Radii and box are all that a header has of a packing.
-    let anywhere = Frame {
-        positions: vec![Vec2::zeros(); recording.radii().len()],
-        ..Frame::default()
-    };
+    let anywhere = vec![Vec2::zeros(); particles];
     let scene = Scene {
         channels,
         ..recording.scene().clone()
     };
     scene.validate()?;
+    if channels.contours.is_on() || channels.contacts.is_on() {
+        let name = format_args!("drawing {particles} particles");
+        recording.allow(name, scene.memory_estimate(particles))?;
+    }
     Ok(Header {
         scene,
-        packing: recording.packing(&anywhere)?,
+        packing: recording.packing_anywhere(anywhere)?,
         from_step: recording.from_step(),
     })
 }
@@ -137,6 +142,7 @@ pub fn convert(
         writer,
         channels: *channels,
         first: recording.from_step(),
+        has_states: recording.scene().channels.state.is_on(),
         waiting: BTreeMap::new(),
         last: None,
         rebuilt: 0,
@@ -154,7 +160,7 @@ pub fn convert(
                 value,
             })) => {
                 conversion.keep(name, step, nanoseconds, value);
-                if !recording.scene().channels.state.is_on() {
+                if !conversion.has_states {
                     conversion.write_whole_rows()?;
                 }
             }
@@ -179,12 +185,17 @@ fn can_be_rebuilt(recording: &Recording, wanted: &Channels) -> Result<(), Conver
     Ok(())
 }
 
+/// Steps whose metrics wait for the next state.
+const MOST_WAITING: usize = 1 << 17;
+
 /// A conversion on its way.
 struct Conversion {
     writer: Writer,
     channels: Channels,
     /// The step that the recording begins with.
     first: u64,
+    /// Whether there are states to wait for.
+    has_states: bool,
     /// Metrics of steps that are not written yet.
     waiting: BTreeMap<u64, Row>,
     /// The last recorded frame; not written yet, since the last of all is written by every channel.
@@ -211,6 +222,15 @@ impl Row {
 
 impl Conversion {
     fn keep(&mut self, name: &str, step: u64, nanoseconds: i64, value: f64) {
+        if self.waiting.len() > MOST_WAITING {
+            // A state far away is walked to, and the metrics on the way are found anew; without states a row that nothing
+            // makes whole is given up.
+            if self.has_states {
+                self.waiting.pop_last();
+            } else {
+                self.waiting.pop_first();
+            }
+        }
         if let Some(place) = METRICS.iter().position(|known| *known == name) {
             let row = self.waiting.entry(step).or_default();
             row.nanoseconds = nanoseconds;
@@ -271,9 +291,19 @@ impl Conversion {
     fn walk(&mut self, recording: &Recording, from: Frame, to: &Frame) -> Result<(), ConvertError> {
         let start = from.step;
         let packing = recording.packing(&from)?;
+        recording.check_run(&from)?;
         let mut run = Relaxation::resume(recording.scene(), packing, from)?;
         let mut snapshots = Snapshots::default();
+        let differs = || ConvertError::Differs {
+            path: recording.path().to_owned(),
+            from: start,
+            step: to.step,
+        };
         loop {
+            if run.status() != Status::Running {
+                // It ends before it comes there.
+                return Err(differs());
+            }
             run.advance()?;
             if run.step() == to.step {
                 break;
@@ -286,11 +316,7 @@ impl Conversion {
         if run.frame().digest() == to.digest() {
             Ok(())
         } else {
-            Err(ConvertError::Differs {
-                path: recording.path().to_owned(),
-                from: start,
-                step: to.step,
-            })
+            Err(differs())
         }
     }
 
