@@ -1,13 +1,15 @@
 //! `softjam convert`: from one format to the other, with more channels or fewer.
 
 use super::flags::ChannelFlags;
+use super::lines::Lines;
+use super::memory::MemoryFlag;
 use super::output::{Output, open_with};
 use super::{Verdict, print};
 use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
 use softjam::replay::Recording;
-use std::fmt::Write as _;
+use softjam::text::shown;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -38,12 +40,15 @@ pub struct Arguments {
     /// Replace an existing file.
     #[arg(long, short)]
     force: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let output = Output::named(&arguments.output);
     output.check(&[Some(&arguments.input)], arguments.force)?;
-    let mut recording = Recording::open(&arguments.input)?;
+    let mut recording = Recording::open_within(&arguments.input, arguments.memory.budget())?;
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
     let header = convert::header(&recording, channels)?;
@@ -52,17 +57,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let converted = converted.map_err(|error| match error {
         ConvertError::Read(error) => anyhow::Error::new(error).context(format!(
             "{} holds what came before the damage",
-            output.path.display()
+            shown(&output.path.display().to_string())
         )),
         other => other.into(),
     })?;
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<14} {value}");
-    };
-    let path = output.path.display();
-    line(
+    let mut lines = Lines::default();
+    let path = shown(&output.path.display().to_string());
+    lines.line(
         "file",
         format!(
             "{path} ({}, {} states)",
@@ -72,13 +73,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     );
     if converted.rebuilt > 0 {
         let steps = converted.rebuilt;
-        line(
+        lines.line(
             "rebuilt",
             format!("{steps} steps computed again, in agreement with the recorded states"),
         );
     }
-    line("open it with", open_with(&output.path, output.format));
-    print(&text)?;
+    lines.line("open it with", open_with(&output.path, output.format));
+    print(&lines.into_text())?;
     if recording.is_closed() {
         return Ok(Verdict::Good);
     }
@@ -87,6 +88,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         .map_or("no state".to_owned(), |step| format!("step {step}"));
     anyhow::bail!(
         "{} breaks off; {path} is whole up to {intact} and names no result",
-        recording.path(),
+        shown(recording.path()),
     )
 }

@@ -1,10 +1,14 @@
 //! `softjam figure`: pictures for papers and talks.
 
+use super::lines::Lines;
+use super::memory::MemoryFlag;
 use super::{Verdict, print};
+use softjam::budget::Budget;
 use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
+use softjam::text::shown;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -53,6 +57,9 @@ pub struct Arguments {
     /// Replace an existing file.
     #[arg(long, short)]
     force: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 #[derive(Clone, Copy)]
@@ -76,8 +83,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     figure::check_name(output)?;
     let inputs: Vec<Option<&Path>> = arguments.files.iter().map(|f| Some(f.as_path())).collect();
     super::output::Output::named(output).check(&inputs, arguments.force)?;
+    let budget = arguments.memory.budget();
     let svg = if arguments.fmax {
-        let runs = arguments.files.iter().map(|path| fall(path));
+        let runs = arguments.files.iter().map(|path| fall(path, budget));
         figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
     } else {
         let [path] = arguments.files.as_slice() else {
@@ -89,7 +97,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         packing(path, arguments)?
     };
     figure::write(output, &svg)?;
-    print(&format!("figure         {}\n", output.display()))?;
+    let mut lines = Lines::default();
+    lines.line("figure", output.display());
+    print(&lines.into_text())?;
     Ok(Verdict::Good)
 }
 
@@ -119,8 +129,8 @@ fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     runs.into_iter().map(named).collect()
 }
 
-fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
-    let mut recording = Recording::open(path)?;
+fn fall(path: &Path, budget: Budget) -> anyhow::Result<(Names, Fall)> {
+    let mut recording = Recording::open_within(path, budget)?;
     let mut points = Vec::new();
     for event in recording.by_ref() {
         if let Event::Metric {
@@ -134,7 +144,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
         }
     }
     if points.is_empty() {
-        let path = path.display();
+        let path = shown(recording.path());
         let problem = format!("{path} holds no metrics; record it with --channels metrics,…");
         return Err(FigureError::Nothing(problem).into());
     }
@@ -145,7 +155,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
         match &recording.scene().start {
             Start::File { path, .. } => {
                 let name = Path::new(path).file_name().unwrap_or_default();
-                format!("from {}", name.display())
+                format!("from {}", shown(&name.display().to_string()))
             }
             Start::Random | Start::Hexagonal => format!("seed {}", recording.scene().seed),
         },
@@ -159,7 +169,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
 }
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
-    let mut recording = Recording::open(path)?;
+    let mut recording = Recording::open_within(path, arguments.memory.budget())?;
     let mut found: Option<Frame> = None;
     let mut states = 0;
     for event in recording.by_ref() {
@@ -172,7 +182,7 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
             found = Some(frame);
         }
     }
-    let shown = path.display();
+    let shown = shown(recording.path());
     let frame = match (found, arguments.step) {
         (None, Step::Number(k)) if states > 0 => Err(format!(
             "{shown} holds no state of step {k}, nor one before it"
