@@ -29,9 +29,10 @@ use crate::frame::Frame;
 use crate::record::{
     Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
 };
-use crate::relax::{RelaxError, Relaxation};
+use crate::relax::{RelaxError, Relaxation, Status};
 use crate::replay::{Event, ReadError, Recording};
 use crate::scene::{Channels, SceneError, Schedule};
+use crate::text::shown;
 use std::collections::BTreeMap;
 
 /// What a conversion came to.
@@ -71,8 +72,9 @@ pub enum ConvertError {
     Scene(#[from] SceneError),
     /// The channels ask for what only a state can give.
     #[error(
-        "{path} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
-         `--channels metrics` and their schedule as it is"
+        "{} holds no states, so nothing can be rebuilt from it: only its metrics can be converted, with \
+         `--channels metrics` and their schedule as it is",
+        shown(.path)
     )]
     NoState {
         /// Path of the recording.
@@ -80,7 +82,8 @@ pub enum ConvertError {
     },
     /// Walking the run again did not lead to the recorded frame.
     #[error(
-        "walking again from step {from} does not lead to the recorded state of step {step}: see `softjam replay {path}`"
+        "walking again from step {from} does not lead to the recorded state of step {step}: see `softjam replay {}`",
+        shown(.path)
     )]
     Differs {
         /// Path of the recording.
@@ -108,6 +111,11 @@ pub fn header(recording: &Recording, channels: Channels) -> Result<Header, Conve
     };
     header.scene.channels = channels;
     header.scene.validate()?;
+    if channels.contours.is_on() || channels.contacts.is_on() {
+        let particles = recording.radii().len();
+        let name = format_args!("drawing {particles} particles");
+        recording.allow(name, header.scene.memory_estimate(particles))?;
+    }
     Ok(header)
 }
 
@@ -132,6 +140,7 @@ pub fn convert(
         writer,
         channels: *channels,
         first: recording.from_step(),
+        has_states: recording.scene().channels.state.is_on(),
         waiting: BTreeMap::new(),
         last: None,
         rebuilt: 0,
@@ -149,7 +158,7 @@ pub fn convert(
                 value,
             })) => {
                 conversion.keep(name, step, nanoseconds, value);
-                if !recording.scene().channels.state.is_on() {
+                if !conversion.has_states {
                     conversion.write_whole_rows()?;
                 }
             }
@@ -174,12 +183,17 @@ fn can_be_rebuilt(recording: &Recording, wanted: &Channels) -> Result<(), Conver
     Ok(())
 }
 
+/// Steps whose metrics wait for the next state.
+const MOST_WAITING: usize = 1 << 17;
+
 /// A conversion on its way.
 struct Conversion {
     writer: Writer,
     channels: Channels,
     /// The step that the recording begins with.
     first: u64,
+    /// Whether there are states to wait for.
+    has_states: bool,
     /// Metrics of steps that are not written yet.
     waiting: BTreeMap<u64, Row>,
     /// The last recorded frame; not written yet, since the last of all is written by every channel.
@@ -206,6 +220,15 @@ impl Row {
 
 impl Conversion {
     fn keep(&mut self, name: &str, step: u64, nanoseconds: i64, value: f64) {
+        if self.waiting.len() > MOST_WAITING {
+            // A state far away is walked to, and the metrics on the way are found anew; without states a row that nothing
+            // makes whole is given up.
+            if self.has_states {
+                self.waiting.pop_last();
+            } else {
+                self.waiting.pop_first();
+            }
+        }
         if let Some(place) = METRICS.iter().position(|known| *known == name) {
             let row = self.waiting.entry(step).or_default();
             row.nanoseconds = nanoseconds;
@@ -266,9 +289,19 @@ impl Conversion {
     fn walk(&mut self, recording: &Recording, from: Frame, to: &Frame) -> Result<(), ConvertError> {
         let start = from.step;
         let packing = recording.packing(&from)?;
+        recording.check_run(&from)?;
         let mut run = Relaxation::resume(recording.scene(), packing, from)?;
         let mut snapshots = Snapshots::default();
+        let differs = || ConvertError::Differs {
+            path: recording.path().to_owned(),
+            from: start,
+            step: to.step,
+        };
         loop {
+            if run.status() != Status::Running {
+                // It ends before it comes there.
+                return Err(differs());
+            }
             run.advance()?;
             if run.step() == to.step {
                 break;
@@ -281,11 +314,7 @@ impl Conversion {
         if run.frame().digest() == to.digest() {
             Ok(())
         } else {
-            Err(ConvertError::Differs {
-                path: recording.path().to_owned(),
-                from: start,
-                step: to.step,
-            })
+            Err(differs())
         }
     }
 

@@ -78,6 +78,16 @@ pub enum FrameError {
         /// Number of particles.
         particles: usize,
     },
+    /// More contacts of a particle than any packing has room for.
+    #[error(
+        "particle {particle} has {contacts} contacts, where a packing has room for some dozens"
+    )]
+    Crowded {
+        /// The particle.
+        particle: usize,
+        /// Number of its contacts.
+        contacts: usize,
+    },
     /// A position lies outside the box, or a number is not finite.
     #[error("{what} {index} is {value}, which no run can give")]
     Value {

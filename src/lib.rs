@@ -43,6 +43,7 @@
 //! | [`force`] | net forces, energy, stress, coordination |
 //! | [`relax`] | FIRE and the loop that yields frames |
 //! | [`frame`] | a frame and its digest |
+//! | [`text`], [`budget`] | text from strangers; how much memory their files may take |
 #![cfg_attr(
     feature = "recording",
     doc = "| [`record`] | recordings, `.rrd` and `.mcap` |\n| [`replay`] | reading them back, checking them |\n| [`convert`] | from one format to the other, with more channels or fewer |"
@@ -57,9 +58,11 @@
 //! The same scene gives the same bits, on any x86-64 CPU: every transcendental function comes from the crate `libm`,
 //! sums have one order, random numbers come from a named generator. A frame determines the next one.
 
+pub mod budget;
 pub mod contact;
 #[cfg(feature = "recording")]
 pub mod convert;
+mod crowding;
 pub mod disks;
 pub mod domain;
 pub mod droplet;
@@ -78,6 +81,7 @@ pub mod relax;
 pub mod replay;
 pub mod scene;
 mod simplicial;
+pub mod text;
 pub mod threads;
 mod wide;
 

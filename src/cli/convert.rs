@@ -1,13 +1,15 @@
 //! `softjam convert`: from one format to the other, with more channels or fewer.
 
 use super::flags::ChannelFlags;
+use super::lines::Lines;
+use super::memory::MemoryFlag;
 use super::output::{Output, end_when_interrupted, open_with};
 use super::{Verdict, print};
 use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
 use softjam::replay::Recording;
-use std::fmt::Write as _;
+use softjam::text::shown;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -40,13 +42,16 @@ pub struct Arguments {
     /// Replace an existing file, when the new one is whole.
     #[arg(long, short)]
     force: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let output = Output::named(&arguments.output);
     output.check(&[Some(&arguments.input)], arguments.force)?;
     end_when_interrupted()?;
-    let mut recording = Recording::open(&arguments.input)?;
+    let mut recording = Recording::open_within(&arguments.input, arguments.memory.budget())?;
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
     let header = convert::header(&recording, channels)?;
@@ -55,7 +60,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let without_states = !recording.scene().channels.state.is_on();
     let converted = converted.map_err(|error| match error {
         ConvertError::Read(error) => {
-            let path = output.path.display();
+            let path = shown(&output.path.display().to_string());
             let error = anyhow::Error::new(error);
             if without_states || recording.intact().is_some() {
                 error.context(format!("{path} holds what came before the damage"))
@@ -65,13 +70,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         }
         other => other.into(),
     })?;
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<14} {value}");
-    };
-    let path = output.path.display();
-    line(
+    let mut lines = Lines::default();
+    let path = shown(&output.path.display().to_string());
+    lines.line(
         "file",
         format!(
             "{path} ({}, {} states)",
@@ -81,13 +82,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     );
     if converted.rebuilt > 0 {
         let steps = converted.rebuilt;
-        line(
+        lines.line(
             "rebuilt",
             format!("{steps} steps computed again, in agreement with the recorded states"),
         );
     }
-    line("open it with", open_with(&output.path, output.format));
-    print(&text)?;
+    lines.line("open it with", open_with(&output.path, output.format));
+    print(&lines.into_text())?;
     if recording.is_closed() {
         return Ok(Verdict::Good);
     }
@@ -96,6 +97,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         .map_or("no state".to_owned(), |step| format!("step {step}"));
     anyhow::bail!(
         "{} breaks off; {path} is whole up to {intact} and names no result",
-        recording.path(),
+        shown(recording.path()),
     )
 }

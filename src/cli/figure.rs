@@ -1,11 +1,15 @@
 //! `softjam figure`: pictures for papers and talks.
 
+use super::lines::Lines;
+use super::memory::MemoryFlag;
 use super::output::{Output, end_when_interrupted};
 use super::{Verdict, print};
+use softjam::budget::Budget;
 use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
+use softjam::text::shown;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -54,6 +58,9 @@ pub struct Arguments {
     /// Replace an existing file, when the new one is whole.
     #[arg(long, short)]
     force: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 #[derive(Clone, Copy)]
@@ -79,8 +86,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     Output::named(output).check(&inputs, arguments.force)?;
     end_when_interrupted()?;
     let file = Output::named(output).begin(arguments.force)?;
+    let budget = arguments.memory.budget();
     let svg = if arguments.fmax {
-        let runs = arguments.files.iter().map(|path| fall(path));
+        let runs = arguments.files.iter().map(|path| fall(path, budget));
         figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
     } else {
         let [path] = arguments.files.as_slice() else {
@@ -92,7 +100,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         packing(path, arguments)?
     };
     figure::write_into(file, &svg)?;
-    print(&format!("figure         {}\n", output.display()))?;
+    let mut lines = Lines::default();
+    lines.line("figure", output.display());
+    print(&lines.into_text())?;
     Ok(Verdict::Good)
 }
 
@@ -122,8 +132,8 @@ fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
     runs.into_iter().map(named).collect()
 }
 
-fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
-    let mut recording = Recording::open(path)?;
+fn fall(path: &Path, budget: Budget) -> anyhow::Result<(Names, Fall)> {
+    let mut recording = Recording::open_within(path, budget)?;
     let mut points = Vec::new();
     for event in recording.by_ref() {
         if let Event::Metric {
@@ -137,7 +147,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
         }
     }
     if points.is_empty() {
-        let path = path.display();
+        let path = shown(recording.path());
         let problem = format!("{path} holds no metrics; record it with --channels metrics,…");
         return Err(FigureError::Nothing(problem).into());
     }
@@ -148,7 +158,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
         match &recording.scene().start {
             Start::File { path, .. } => {
                 let name = Path::new(path).file_name().unwrap_or_default();
-                format!("from {}", name.display())
+                format!("from {}", shown(&name.display().to_string()))
             }
             Start::Random | Start::Hexagonal => format!("seed {}", recording.scene().seed),
         },
@@ -162,7 +172,7 @@ fn fall(path: &Path) -> anyhow::Result<(Names, Fall)> {
 }
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
-    let mut recording = Recording::open(path)?;
+    let mut recording = Recording::open_within(path, arguments.memory.budget())?;
     let mut found: Option<Frame> = None;
     let mut states = 0;
     for event in recording.by_ref() {
@@ -175,7 +185,7 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
             found = Some(frame);
         }
     }
-    let shown = path.display();
+    let shown = shown(recording.path());
     let frame = match (found, arguments.step) {
         (None, Step::Number(k)) if states > 0 => Err(format!(
             "{shown} holds no state of step {k}, nor one before it"

@@ -3,6 +3,7 @@
 use anyhow::Context as _;
 use clap::Args;
 use softjam::scene::{Channels, Scene, SceneError, SceneFields, Schedule};
+use softjam::text::shown;
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -116,12 +117,11 @@ impl SceneFlags {
         self.scene_over(match &self.scene {
             None => SceneFields::default(),
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
-                    path: path.display().to_string(),
-                    source,
-                })?;
-                SceneFields::from_toml(&text)
-                    .with_context(|| format!("scene file {}", path.display()))?
+                let name = shown(&path.display().to_string());
+                match SceneFields::read(path) {
+                    Err(error @ SceneError::Read { .. }) => return Err(error.into()),
+                    read => read.with_context(|| format!("scene file {name}"))?,
+                }
             }
         })
     }

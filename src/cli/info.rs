@@ -1,5 +1,7 @@
 //! `softjam info`: says what a recording holds.
 
+use super::lines::Lines;
+use super::memory::MemoryFlag;
 use super::{Verdict, print};
 use softjam::contact::FrameContacts;
 use softjam::droplet::validity::{SQUEEZE_LIMIT, Validity};
@@ -7,7 +9,6 @@ use softjam::frame::Frame;
 use softjam::record::Outcome;
 use softjam::replay::{Event, ReadError, Recording};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Print one JSON object instead of lines.
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 /// What a pass over the file finds.
@@ -93,7 +97,7 @@ impl Findings {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let mut recording = Recording::open(&arguments.file)?;
+    let mut recording = Recording::open_within(&arguments.file, arguments.memory.budget())?;
     let found = Findings::of(&mut recording);
     let closed = recording.is_closed();
     if arguments.json {
@@ -132,17 +136,13 @@ fn state_of(found: &Findings, closed: bool) -> String {
 }
 
 fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> String {
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<14} {value}");
-    };
+    let mut lines = Lines::default();
     let l = recording.domain().lengths();
     let scene = recording.scene();
-    line("file", path.to_owned());
-    line("recorded by", recording.program().to_owned());
-    line("result", state_of(found, closed));
-    line(
+    lines.line("file", path.to_owned());
+    lines.line("recorded by", recording.program().to_owned());
+    lines.line("result", state_of(found, closed));
+    lines.line(
         "packing",
         format!(
             "N = {}, φ = {:.4}, box {:.3} × {:.3}, γ = {}",
@@ -161,7 +161,7 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         } else {
             ""
         };
-        line(
+        lines.line(
             channel,
             format!("{count} steps, {first} … {last}{where_drawn}"),
         );
@@ -172,14 +172,14 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         } else {
             "none: the recording can be looked at, not replayed"
         };
-        line("state", none.to_owned());
+        lines.line("state", none.to_owned());
     }
     if let Some(last) = &found.last {
         let digest = hex(last.digest());
-        line("digest", format!("{digest} (state of step {})", last.step));
+        lines.line("digest", format!("{digest} (state of step {})", last.step));
     }
     if let Some(squeeze) = found.squeeze(recording) {
-        line(
+        lines.line(
             "squeeze",
             format!(
                 "mean {:.4}, largest {:.4} (particle {}); {} of {} particles beyond {SQUEEZE_LIMIT}",
@@ -188,9 +188,9 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         );
     }
     for (name, value) in &found.metrics {
-        line(name, format!("{value:.6e}"));
+        lines.line(name, format!("{value:.6e}"));
     }
-    text
+    lines.into_text()
 }
 
 /// BLAKE3 in hexadecimal, as `b3sum` writes it.

@@ -6,8 +6,10 @@ mod convert;
 mod figure;
 mod flags;
 mod info;
+mod lines;
 mod live;
 mod manual;
+mod memory;
 mod output;
 mod record;
 mod replay;
@@ -96,7 +98,7 @@ pub fn run() -> ExitCode {
 /// The chain of causes, without those that the error before them has already quoted.
 fn message(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |text, cause| {
-        let cause = cause.to_string();
+        let cause = softjam::text::lines(&cause.to_string());
         match text.as_str() {
             "" => cause,
             said if said.contains(cause.trim_end()) => text,
@@ -149,7 +151,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 
 fn warn(text: &str) {
     // A warning that nobody can read is no failure.
-    let _ = writeln!(std::io::stderr(), "warning: {text}");
+    let _ = writeln!(std::io::stderr(), "warning: {}", softjam::text::lines(text));
 }
 
 /// Writes a result to standard output; a closed pipe (`| head`) is no failure.

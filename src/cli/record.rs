@@ -1,10 +1,13 @@
 //! `softjam record`: relaxes a scene and records it.
 
 use super::flags::{RECORDING, RELAXATION, SceneFlags};
+use super::lines::Lines;
 use super::live::LiveFlags;
+use super::memory::MemoryFlag;
 use super::output::{Output, open_with};
 use super::{Verdict, print, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use softjam::budget::Budget;
 use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
@@ -14,8 +17,7 @@ use softjam::relax::Relaxation;
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
 use softjam::threads;
-use std::fmt::Write as _;
-use std::io::IsTerminal as _;
+use std::io::{BufRead as _, BufReader, IsTerminal as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -79,6 +81,9 @@ pub struct Arguments {
 
     #[command(flatten)]
     live: LiveFlags,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
@@ -88,8 +93,15 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let origin = match &arguments.from {
         None => match arguments.scene.file_unlike_text() {
-            None => Origin::Scene(arguments.scene.scene()?.pinned()?),
+            None => {
+                let scene = arguments.scene.scene()?;
+                if let Start::File { path, .. } = &scene.start {
+                    check_start_file(path.as_ref(), arguments.memory.budget())?;
+                }
+                Origin::Scene(scene.pinned()?)
+            }
             Some(path) => {
+                check_start_file(path, arguments.memory.budget())?;
                 let scene = arguments.scene.scene()?;
                 let (start, packing) = start::from_file(path)?;
                 Origin::Packing(Scene { start, ..scene }, packing)
@@ -98,7 +110,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
         Some(path) => recorded_frame(path, arguments)?,
     };
     let scene = origin.scene().clone();
-    fits_in_memory(&scene)?;
+    fits_in_memory(&origin, &arguments.memory)?;
     let outputs = outputs(arguments, &scene)?;
     // Newton's method carries the forces along with the positions; only round-off holds it up.
     let (least, reason) = match scene.minimizer {
@@ -247,7 +259,7 @@ impl Origin {
 
 /// The frame to go on from, and its scene with what the flags change about its end and its recording.
 fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> {
-    let mut recording = Recording::open(path)?;
+    let mut recording = Recording::open_within(path, arguments.memory.budget())?;
     let fields = SceneFields::from_toml(&recording.scene().to_toml())?;
     let scene = arguments.scene.scene_over(fields)?;
     let mut found = None;
@@ -295,26 +307,45 @@ fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> 
     }
 }
 
+/// Refuses a start file that is too long for the budget.
+fn check_start_file(path: &Path, budget: Budget) -> Result<(), SceneError> {
+    let length = std::fs::metadata(path).map_or(0, |file| file.len());
+    let allowed = budget.allow_piece("the text", length);
+    allowed.map_err(|exceeded| SceneError::StartFile {
+        path: path.display().to_string(),
+        line: 0,
+        problem: exceeded.to_string(),
+    })
+}
+
+/// The lines of a start file: about as many as particles.
+fn lines_in(path: &str) -> Result<usize, SceneError> {
+    let unreadable = |source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    Ok(BufReader::new(file).split(b'\n').count())
+}
+
 /// Refuses a scene that would bring the machine down instead of relaxing.
-fn fits_in_memory(scene: &Scene) -> Result<(), SceneError> {
-    if !scene.starts_from_disks() {
-        // A start file that fits in memory tells its own size.
-        return Ok(());
-    }
-    let mut system = sysinfo::System::new();
-    system.refresh_memory();
-    let limit = system.cgroup_limits().map(|c| c.free_memory);
-    let available = system.available_memory().min(limit.unwrap_or(u64::MAX));
-    let needed = scene.memory_estimate(scene.particles);
+fn fits_in_memory(origin: &Origin, memory: &MemoryFlag) -> Result<(), SceneError> {
+    let scene = origin.scene();
+    let particles = match (origin, &scene.start) {
+        (Origin::Frame(_, packing, _) | Origin::Packing(_, packing), _) => packing.len(),
+        (Origin::Scene(_), Start::File { path, .. }) => lines_in(path)?,
+        (Origin::Scene(_), Start::Random | Start::Hexagonal) => scene.particles,
+    };
+    let needed = scene.memory_estimate(particles);
     // Where the system does not tell, it is asked the hard way.
-    if available > 0 && needed > available {
-        return Err(SceneError::Memory {
-            particles: scene.particles,
+    match memory.free() {
+        Some(available) if needed > available => Err(SceneError::Memory {
+            particles,
             needed_mib: needed >> 20,
             available_mib: available >> 20,
-        });
+        }),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The progress bar; none unless standard error is a terminal.
@@ -383,17 +414,13 @@ fn report(
         Some(end) if end.converged => format!("converged in {} steps", end.steps),
         Some(end) => format!("not converged within {} steps", end.steps),
     };
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<14} {value}");
-    };
-    line("result", verdict);
+    let mut lines = Lines::default();
+    lines.line("result", verdict);
     let origin = match &scene.start {
         Start::File { path, .. } => format!("from {path}"),
         Start::Random | Start::Hexagonal => format!("seed {}", scene.seed),
     };
-    line(
+    lines.line(
         "packing",
         format!(
             "N = {}, φ = {:.4}, box {:.3} × {:.3}, {origin}",
@@ -405,7 +432,7 @@ fn report(
     );
     if let Some(disks) = run.disks() {
         let ending = if disks.converged { "" } else { " (step limit)" };
-        line(
+        lines.line(
             "disks",
             format!(
                 "{} steps to f_max = {:.2e} γ, Z = {:.3}{ending}",
@@ -413,11 +440,11 @@ fn report(
             ),
         );
     }
-    line(
+    lines.line(
         "f_max",
         format!("{:.3e} γ (threshold {:.1e} γ)", o.f_max, scene.threshold),
     );
-    line(
+    lines.line(
         "Z",
         format!(
             "{:.4} ({} contacts between particles that are held, {} rattlers)",
@@ -426,9 +453,9 @@ fn report(
             o.rattlers
         ),
     );
-    line("pressure", format!("{:.6e} γ/length", o.pressure()));
-    line("energy", format!("{:.6e} γ·length", o.energy));
-    line(
+    lines.line("pressure", format!("{:.6e} γ/length", o.pressure()));
+    lines.line("energy", format!("{:.6e} γ·length", o.energy));
+    lines.line(
         "contact law",
         format!(
             "residual {:.1e} of the largest overlap",
@@ -436,7 +463,7 @@ fn report(
         ),
     );
     let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);
-    line(
+    lines.line(
         "time",
         format!(
             "{:.2} s disks, {:.2} s relaxation ({rate:.0} steps/s)",
@@ -445,7 +472,7 @@ fn report(
         ),
     );
     for (output, written) in outputs.iter().zip(&summary.files) {
-        line(
+        lines.line(
             "file",
             format!(
                 "{} ({}, {} states)",
@@ -454,7 +481,7 @@ fn report(
                 written.states
             ),
         );
-        line("open it with", open_with(&output.path, output.format));
+        lines.line("open it with", open_with(&output.path, output.format));
     }
-    text
+    lines.into_text()
 }

@@ -1,5 +1,6 @@
 //! `softjam replay`: lets a recording prove itself.
 
+use super::memory::MemoryFlag;
 use super::{Verdict, print};
 use clap::ValueEnum;
 use softjam::record::Outcome;
@@ -44,6 +45,9 @@ pub struct Arguments {
     /// Print one JSON object instead of lines.
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    memory: MemoryFlag,
 }
 
 /// What can be asked of a recording.
@@ -85,7 +89,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 }
 
 fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
-    let mut recording = Recording::open(&arguments.file)?;
+    let mut recording = Recording::open_within(&arguments.file, arguments.memory.budget())?;
     let wanted = |question| arguments.only.is_none_or(|only| only == question);
     let balance = wanted(Question::Balance).then(|| Balance::new(recording.scene()));
     let way = if arguments.segments {

@@ -29,6 +29,9 @@ use resvg::usvg::{Options, Tree};
 use std::io::Write as _;
 use std::path::Path;
 
+use crate::replay::guarded;
+use crate::text::{lines, shown};
+
 /// The typeface of all figures.
 const FONT: &str = "DejaVu Sans";
 
@@ -46,13 +49,13 @@ const PIXELS: f32 = 2.0;
 #[non_exhaustive]
 pub enum FigureError {
     /// The file's name ends in neither `.svg` nor `.png`.
-    #[error("{path}: a figure's name ends in .svg or .png")]
+    #[error("{}: a figure's name ends in .svg or .png", shown(.path))]
     Name {
         /// Path of the file.
         path: String,
     },
     /// The file could not be written.
-    #[error("cannot write {path}: {source}")]
+    #[error("cannot write {}: {source}", shown(.path))]
     Write {
         /// Path of the file.
         path: String,
@@ -63,10 +66,10 @@ pub enum FigureError {
     #[error(transparent)]
     File(#[from] RecordError),
     /// The picture could not be drawn.
-    #[error("the figure cannot be drawn: {0}")]
+    #[error("the figure cannot be drawn: {}", shown(.0))]
     Draw(String),
     /// There is nothing to draw.
-    #[error("{0}")]
+    #[error("{}", lines(.0))]
     Nothing(String),
 }
 
@@ -128,6 +131,7 @@ pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
     let bytes = if is_png(path)? {
         png(svg)?
     } else {
+        check_numbers(svg)?;
         svg.as_bytes().to_vec()
     };
     let written = file.write_all(&bytes).and_then(|()| file.publish());
@@ -154,6 +158,7 @@ pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
 /// assert!(png.starts_with(b"\x89PNG"));
 /// ```
 pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
+    check_numbers(svg)?;
     let mut options = Options {
         font_family: FONT.to_owned(),
         ..Options::default()
@@ -165,16 +170,38 @@ pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     fonts.set_sans_serif_family(FONT);
     let draw = |e: &dyn std::fmt::Display| FigureError::Draw(e.to_string());
     let tree = Tree::from_str(svg, &options).map_err(|e| draw(&e))?;
+    let (width, height) = (tree.size().width(), tree.size().height());
+    if width.max(height) > LONGEST_SIDE {
+        return Err(draw(&format!(
+            "{width:.0} × {height:.0} is too long for a PNG; name a file that ends in .svg"
+        )));
+    }
     let size = tree.size().to_int_size().scale_by(PIXELS);
     let pixels = size.and_then(|size| Pixmap::new(size.width(), size.height()));
     let mut pixels = pixels.ok_or_else(|| draw(&"it has no size"))?;
     pixels.fill(Color::WHITE);
-    resvg::render(
-        &tree,
-        Transform::from_scale(PIXELS, PIXELS),
-        &mut pixels.as_mut(),
-    );
+    // It panics at some shapes that are far larger than the sheet.
+    guarded(|| {
+        let scale = Transform::from_scale(PIXELS, PIXELS);
+        resvg::render(&tree, scale, &mut pixels.as_mut());
+        Ok(())
+    })
+    .map_err(|e| draw(&e))?;
     pixels.encode_png().map_err(|e| draw(&e))
+}
+
+/// Units of the longest side of a PNG.
+const LONGEST_SIDE: f32 = 20_000.0;
+
+/// Refuses a figure whose shapes have places or sizes that are no numbers: forces or lengths beyond what a number can hold. Text is no
+/// place.
+fn check_numbers(svg: &str) -> Result<(), FigureError> {
+    let mut tags = svg.split('<').map(|part| part.split('>').next());
+    if tags.any(|tag| tag.is_some_and(|tag| tag.contains("NaN") || tag.contains("inf"))) {
+        let problem = "forces or lengths are beyond what a number can hold".to_owned();
+        return Err(FigureError::Draw(problem));
+    }
+    Ok(())
 }
 
 /// A number as `9.6·10⁻¹¹`.

@@ -4,6 +4,7 @@ use super::columns::array;
 use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, legend};
 use crate::scene::{Scene, Start};
+use crate::text::shown;
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
@@ -106,7 +107,7 @@ fn start(scene: &Scene, seed: &str) -> String {
     match &scene.start {
         Start::Random => format!("{seed} {}", scene.seed),
         Start::Hexagonal => "a hexagonal crystal".to_owned(),
-        Start::File { path, .. } => format!("the packing in `{path}`"),
+        Start::File { path, .. } => format!("the packing in `{}`", shown(path)),
     }
 }
 

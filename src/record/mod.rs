@@ -56,6 +56,7 @@ pub(crate) use snapshot::{Snapshots, nanoseconds};
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::{Channels, Scene};
+use crate::text::shown;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -249,7 +250,7 @@ pub struct Summary {
 #[non_exhaustive]
 pub enum RecordError {
     /// The file exists and is not to be replaced.
-    #[error("{path} exists; say --force to replace it, or name another file")]
+    #[error("{} exists; say --force to replace it, or name another file", shown(.path))]
     Exists {
         /// Path of the file.
         path: String,
@@ -265,19 +266,19 @@ pub enum RecordError {
         locked: String,
     },
     /// The file is one that the run reads from.
-    #[error("{path} is what is read from; name another file to write")]
+    #[error("{} is what is read from; name another file to write", shown(.path))]
     Input {
         /// Path of the file.
         path: String,
     },
     /// Two outputs are one file.
-    #[error("{path} is named twice; give each format a file of its own")]
+    #[error("{} is named twice; give each format a file of its own", shown(.path))]
     Twice {
         /// Path of the file.
         path: String,
     },
     /// The file could not be made.
-    #[error("cannot create {path}: {source}")]
+    #[error("cannot create {}: {}", shown(.path), shown(&.source.to_string()))]
     Create {
         /// Path of the file.
         path: String,
@@ -286,7 +287,8 @@ pub enum RecordError {
     },
     /// The file could not be written on.
     #[error(
-        "step {step}: cannot write {path}: {source}; {}",
+        "step {step}: cannot write {}: {source}; {}",
+        shown(.path),
         recorded_up_to(*intact)
     )]
     Write {

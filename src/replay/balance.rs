@@ -6,6 +6,7 @@
 
 use crate::contact::list::ContactList;
 use crate::contact::matrix::{ContactMatrix, Geometry};
+use crate::contact::solver::Method;
 use crate::contact::{ACCEPTED, ContactError, ContactLaw, FrameContacts, Rule, due_tolerance};
 use crate::domain::Vec2;
 use crate::force::{NetForces, Observables, largest_force};
@@ -123,7 +124,8 @@ impl Balance {
         Self {
             law: ContactLaw::new(
                 Rule::Complementarity,
-                scene.contact_solver,
+                // The answer is unique, and not every solver is fit for every number of contacts.
+                Method::ConjugateGradient,
                 scene.line_tension,
                 scene.contact_tolerance.min(1e-12),
             ),

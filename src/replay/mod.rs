@@ -27,9 +27,13 @@ pub use difference::{Difference, Row, What, ulps};
 pub use recording::{Metrics, Recording, State};
 pub use source::reading_damaged_bytes;
 
+#[cfg(feature = "figure")]
+pub(crate) use source::guarded;
+
 use crate::frame::{Frame, FrameError};
 use crate::record::Outcome;
 use crate::scene::SceneError;
+use crate::text::shown;
 
 /// Something that a recording holds behind its header.
 ///
@@ -80,7 +84,7 @@ pub enum Event {
 #[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened.
-    #[error("cannot read {path}: {source}")]
+    #[error("cannot read {}: {source}", shown(.path))]
     Open {
         /// Path of the file.
         path: String,
@@ -88,7 +92,7 @@ pub enum ReadError {
         source: std::io::Error,
     },
     /// The file is not what its format asks for.
-    #[error("{path} is not {format}: {problem}")]
+    #[error("{} is not {format}: {}", shown(.path), shown(.problem))]
     Format {
         /// Path of the file.
         path: String,
@@ -99,7 +103,8 @@ pub enum ReadError {
     },
     /// A file of another program, or one that breaks off before its scene.
     #[error(
-        "{path} is not a softjam recording, or breaks off before it says so: it has no {missing}"
+        "{} is not a softjam recording, or breaks off before it says so: it has no {missing}",
+        shown(.path)
     )]
     NotSoftjam {
         /// Path of the file.
@@ -109,7 +114,8 @@ pub enum ReadError {
     },
     /// The recording is of a later version of the layout.
     #[error(
-        "{path} has format version {found}, this program reads up to {known}: use a newer softjam"
+        "{} has format version {found}, this program reads up to {known}: use a newer softjam",
+        shown(.path)
     )]
     Newer {
         /// Path of the file.
@@ -120,7 +126,7 @@ pub enum ReadError {
         known: u32,
     },
     /// The scene in the recording does not parse.
-    #[error("the scene in {path} cannot be read: {source}")]
+    #[error("the scene in {} cannot be read: {source}", shown(.path))]
     Scene {
         /// Path of the file.
         path: String,
@@ -129,7 +135,10 @@ pub enum ReadError {
     },
     /// The recording was made of another scene than the one it names.
     #[error(
-        "the scene in {path} was changed after it was recorded: the recording is {found}, its scene makes {expected}"
+        "the scene in {} was changed after it was recorded: the recording is {}, its scene makes {}",
+        shown(.path),
+        shown(.found),
+        shown(.expected)
     )]
     Changed {
         /// Path of the file.
@@ -139,8 +148,40 @@ pub enum ReadError {
         /// The id that its scene gives.
         expected: String,
     },
+    /// Radii or box are none that its scene can have.
+    #[error("{} is no recording of its scene: {problem}", shown(.path))]
+    Particles {
+        /// Path of the file.
+        path: String,
+        /// What its scene and its radii do not agree on.
+        problem: String,
+    },
+    /// It claims to need more memory than there may be.
+    #[error("{}: {problem}", shown(.path))]
+    Budget {
+        /// Path of the file.
+        path: String,
+        /// What needs too much, and the way out.
+        problem: String,
+    },
+    /// Particles lie on each other as in no packing, so nothing can be computed from their positions.
+    #[error(
+        "{}: at step {step} {others} particles overlap particle {particle}, where a packing has room for some dozens: nothing can \
+         be computed from this state",
+        shown(.path)
+    )]
+    Crowded {
+        /// Path of the file.
+        path: String,
+        /// The step.
+        step: u64,
+        /// The particle.
+        particle: usize,
+        /// How many others overlap it.
+        others: usize,
+    },
     /// The stream is damaged.
-    #[error("{path} is damaged: {problem}; {}", intact_up_to(*intact))]
+    #[error("{} is damaged: {}; {}", shown(.path), shown(.problem), intact_up_to(*intact))]
     Damaged {
         /// Path of the file.
         path: String,
@@ -150,7 +191,7 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// The file holds more than one recording.
-    #[error("{path} holds several recordings, one behind the other; {}", intact_up_to(*intact))]
+    #[error("{} holds several recordings, one behind the other; {}", shown(.path), intact_up_to(*intact))]
     Several {
         /// Path of the file.
         path: String,
@@ -158,7 +199,7 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// States are missing or out of order.
-    #[error("{path}: {problem}; {}", intact_up_to(*intact))]
+    #[error("{}: {}; {}", shown(.path), shown(.problem), intact_up_to(*intact))]
     Steps {
         /// Path of the file.
         path: String,
@@ -168,7 +209,7 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// The recorded result does not belong to the recorded states.
-    #[error("{path}: the result is wrong: {problem}; {}", intact_up_to(*intact))]
+    #[error("{}: the result is wrong: {}; {}", shown(.path), shown(.problem), intact_up_to(*intact))]
     Result {
         /// Path of the file.
         path: String,
@@ -178,7 +219,7 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// A frame is not one that a run can give.
-    #[error("{path}: the state at step {step} is damaged: {source}; {}", intact_up_to(*intact))]
+    #[error("{}: the state at step {step} is damaged: {source}; {}", shown(.path), intact_up_to(*intact))]
     Frame {
         /// Path of the file.
         path: String,
@@ -190,7 +231,7 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// The state of a frame does not have the digest that was recorded with it.
-    #[error("{path}: the digest of step {step} differs, so its state was changed after it was written; {}", intact_up_to(*intact))]
+    #[error("{}: the digest of step {step} differs, so its state was changed after it was written; {}", shown(.path), intact_up_to(*intact))]
     Digest {
         /// Path of the file.
         path: String,

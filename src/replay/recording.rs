@@ -6,8 +6,11 @@ use super::source::{Ending, Header, Item, Problem, Source};
 use super::steps::Steps;
 use super::walk::End;
 use super::{Event, ReadError, mcap, rrd};
+use crate::budget::Budget;
+use crate::contact::solver::Method;
+use crate::crowding::{self, Crowd};
 use crate::domain::{Domain, Vec2};
-use crate::frame::Frame;
+use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
 use crate::record::{Format, Outcome, PROGRAM};
 use crate::scene::Scene;
@@ -51,7 +54,14 @@ pub struct Recording {
     ended: bool,
     /// Metrics of steps that no state has been handed out for yet.
     metrics: Metrics,
+    budget: Budget,
 }
+
+/// Bytes that the metrics of a step take while they wait for a state.
+const WAITING_METRICS: u64 = 800;
+
+/// Unknowns of the largest dense system of equations that a recording may ask for: a minute each.
+const LARGEST_DENSE: usize = 10_000;
 
 /// Metrics by step: names and values.
 ///
@@ -83,6 +93,20 @@ impl Recording {
     /// assert!(error.to_string().starts_with("cannot read /nowhere/run.rrd"));
     /// ```
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        Self::open_within(path, Budget::default())
+    }
+
+    /// [`open`](Self::open) with a budget for what the file may take.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] says what is wrong with the file, or what does not fit.
+    ///
+    /// ```
+    /// use softjam::{budget::Budget, replay::Recording};
+    /// assert!(Recording::open_within("/nowhere/run.rrd", Budget::of(1 << 30)).is_err());
+    /// ```
+    pub fn open_within(path: impl AsRef<Path>, budget: Budget) -> Result<Self, ReadError> {
         let name = path.as_ref().display().to_string();
         let open = |path: &Path| {
             // Before it is opened: a pipe would wait for its other end.
@@ -96,7 +120,7 @@ impl Recording {
             path: name.clone(),
             source,
         })?;
-        Self::read(&name, BufReader::new(file), length)
+        Self::read_within(&name, BufReader::new(file), length, budget)
     }
 
     /// Reads a recording of `length` bytes from any source; errors call it `name`.
@@ -113,6 +137,25 @@ impl Recording {
         name: &str,
         source: impl Read + Send + 'static,
         length: u64,
+    ) -> Result<Self, ReadError> {
+        Self::read_within(name, source, length, Budget::default())
+    }
+
+    /// [`read`](Self::read) with a budget for what the recording may take.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] says what is wrong with it, or what does not fit.
+    ///
+    /// ```
+    /// use softjam::{budget::Budget, replay::Recording};
+    /// assert!(Recording::read_within("nothing", &[][..], 0, Budget::default()).is_err());
+    /// ```
+    pub fn read_within(
+        name: &str,
+        source: impl Read + Send + 'static,
+        length: u64,
+        budget: Budget,
     ) -> Result<Self, ReadError> {
         let mut source = source;
         let mut start = Vec::new();
@@ -137,14 +180,15 @@ impl Recording {
         let whole = Box::new(Cursor::new(start).chain(source));
         let (source, header): (Box<dyn Source>, Header) = match format {
             Format::Rrd => {
-                let (source, header) = RrdSource::open(name, whole, length)?;
+                let (source, header) = RrdSource::open(name, whole, length, budget)?;
                 (Box::new(source), header)
             }
             Format::Mcap => {
-                let (source, header) = McapSource::open(name, whole, length)?;
+                let (source, header) = McapSource::open(name, whole, length, budget)?;
                 (Box::new(source), header)
             }
         };
+        header.check(name)?;
         Ok(Self {
             path: name.to_owned(),
             format,
@@ -161,6 +205,7 @@ impl Recording {
             outcome: None,
             ended: false,
             metrics: Metrics::new(),
+            budget,
         })
     }
 
@@ -186,8 +231,6 @@ impl Recording {
     /// # std::fs::remove_file(&path).unwrap();
     /// ```
     pub fn next_state(&mut self) -> Result<Option<State>, ReadError> {
-        // More steps than any batch holds: what keeps memory bounded in a recording of metrics alone.
-        const MOST: usize = 1 << 16;
         while let Some(event) = self.next() {
             match event? {
                 Event::State(frame) => {
@@ -201,8 +244,10 @@ impl Recording {
                 Event::Metric {
                     name, step, value, ..
                 } => {
-                    if self.header.scene.channels.state.is_on() || self.metrics.len() < MOST {
+                    // Without states there is nobody to give them to.
+                    if self.header.scene.channels.state.is_on() {
                         self.metrics.entry(step).or_default().push((name, value));
+                        self.allow_waiting_metrics()?;
                     }
                 }
                 Event::Drawn { .. } | Event::Result { .. } => {}
@@ -324,12 +369,32 @@ impl Recording {
     ///
     /// # Errors
     ///
-    /// [`ReadError::Damaged`] if the frame is not one of this recording.
+    /// [`ReadError::Damaged`] if the frame is not one of this recording, [`ReadError::Crowded`] if particles lie on each other as
+    /// in no packing.
     ///
     /// See the example of [`Recording`].
     pub fn packing(&self, frame: &Frame) -> Result<Packing, ReadError> {
+        self.packing_and_overlaps(frame).map(|(packing, _)| packing)
+    }
+
+    /// The packing at a frame, and the number of pairs of its disks that overlap.
+    fn packing_and_overlaps(&self, frame: &Frame) -> Result<(Packing, usize), ReadError> {
+        let packing = self.packing_anywhere(frame.positions.clone())?;
+        match crowding::pairs(&packing) {
+            Ok(overlaps) => Ok((packing, overlaps)),
+            Err(Crowd { particle, others }) => Err(ReadError::Crowded {
+                path: self.path.clone(),
+                step: frame.step,
+                particle,
+                others,
+            }),
+        }
+    }
+
+    /// The particles at any positions.
+    pub(crate) fn packing_anywhere(&self, positions: Vec<Vec2>) -> Result<Packing, ReadError> {
         let radii = self.header.radii.clone();
-        Packing::new(self.header.domain, radii, frame.positions.clone())
+        Packing::new(self.header.domain, radii, positions)
             .map_err(|error| self.damaged(error.to_string()))
     }
 
@@ -349,6 +414,68 @@ impl Recording {
     /// Whether the file does not claim to be as this version writes it: another program, or another version, wrote it.
     pub(super) fn is_laid_out_otherwise(&self) -> bool {
         !self.source.is_of_softjam() || self.header.program != PROGRAM
+    }
+
+    /// Whether the scene can be run from `frame` on within the budget: to be asked before it is.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError::Budget`] names what takes too much and the way out.
+    ///
+    /// ```
+    /// use softjam::replay::Recording;
+    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # let path = std::env::temp_dir().join("softjam-check-run-example.rrd");
+    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+    /// # let mut run = Relaxation::new(&scene).unwrap();
+    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
+    /// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
+    ///
+    /// let mut recording = Recording::open(&path).unwrap();
+    /// let first = recording.next_state().unwrap().unwrap();
+    /// assert!(recording.check_run(&first.frame).is_ok());
+    /// # std::fs::remove_file(&path).unwrap();
+    /// ```
+    pub fn check_run(&self, frame: &Frame) -> Result<(), ReadError> {
+        let (_, overlaps) = self.packing_and_overlaps(frame)?;
+        let (scene, particles) = (self.scene(), self.header.radii.len());
+        let name = format_args!("a run of its scene with {particles} particles");
+        self.allow(name, scene.memory_estimate(particles))?;
+        let unknowns = overlaps.max(frame.contacts.len());
+        if scene.contact_solver != Method::GaussJordan {
+            return Ok(());
+        }
+        let name = format_args!("its contact_solver \"gauss-jordan\" with {unknowns} unknowns");
+        self.allow(&name, 8 * (unknowns as u64).saturating_pow(2))?;
+        if unknowns <= LARGEST_DENSE {
+            return Ok(());
+        }
+        Err(ReadError::Budget {
+            path: self.path.clone(),
+            problem: format!(
+                "{name} takes longer than anyone waits, more than {LARGEST_DENSE} are not run; `softjam replay --only balance` \
+                 does without a run"
+            ),
+        })
+    }
+
+    /// Refuses what takes more memory than there may be.
+    pub(crate) fn allow(&self, what: impl core::fmt::Display, bytes: u64) -> Result<(), ReadError> {
+        let allowed = self.budget.allow(what, bytes);
+        allowed.map_err(|exceeded| ReadError::Budget {
+            path: self.path.clone(),
+            problem: format!("{exceeded}; `softjam replay --only balance` does without a run"),
+        })
+    }
+
+    fn allow_waiting_metrics(&self) -> Result<(), ReadError> {
+        let steps = self.metrics.len() as u64;
+        let name = format_args!("the metrics of {steps} steps between two states");
+        let allowed = self.budget.allow_piece(name, WAITING_METRICS * steps);
+        allowed.map_err(|exceeded| ReadError::Budget {
+            path: self.path.clone(),
+            problem: exceeded.to_string(),
+        })
     }
 
     /// How the run ended, as far as it has been read.
@@ -405,6 +532,19 @@ impl Recording {
                 source,
                 intact,
             })?;
+        if let Some(Crowd { particle, others }) =
+            crowding::contacts(&self.header.radii, &frame.contacts)
+        {
+            return Err(ReadError::Frame {
+                path: self.path.clone(),
+                step,
+                source: FrameError::Crowded {
+                    particle,
+                    contacts: others,
+                },
+                intact,
+            });
+        }
         self.steps
             .accept(step)
             .map_err(|problem| ReadError::Steps {
@@ -499,6 +639,10 @@ impl Iterator for Recording {
             self.ended = true;
             self.events.push_back(Err(match problem {
                 Problem::Damage(problem) => self.damaged(problem),
+                Problem::Budget(problem) => ReadError::Budget {
+                    path: self.path.clone(),
+                    problem,
+                },
                 Problem::Several => ReadError::Several {
                     path: self.path.clone(),
                     intact: self.steps.last,

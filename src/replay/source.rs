@@ -1,10 +1,13 @@
 //! What a recording gives before it is checked, whatever its format.
 
 use super::ReadError;
+use crate::budget::Exceeded;
 use crate::domain::Domain;
 use crate::frame::Frame;
+use crate::packing::coverage;
 use crate::record::{FORMAT_VERSION, Outcome};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneFields};
+use crate::text::shown;
 use std::cell::Cell;
 use std::panic::AssertUnwindSafe;
 
@@ -41,8 +44,28 @@ pub(super) enum Item {
 pub(super) enum Problem {
     /// The file is damaged.
     Damage(String),
+    /// It claims to need more memory than there may be.
+    Budget(String),
     /// Another recording follows in the same file.
     Several,
+}
+
+impl Problem {
+    /// As an error in front of the first frame; damage is what `damaged` makes of it.
+    pub fn at_start(self, path: &str, damaged: impl FnOnce(String) -> ReadError) -> ReadError {
+        let path = path.to_owned();
+        match self {
+            Self::Damage(problem) => damaged(problem),
+            Self::Budget(problem) => ReadError::Budget { path, problem },
+            Self::Several => ReadError::Several { path, intact: None },
+        }
+    }
+}
+
+impl From<Exceeded> for Problem {
+    fn from(exceeded: Exceeded) -> Self {
+        Self::Budget(exceeded.to_string())
+    }
 }
 
 impl From<String> for Problem {
@@ -72,6 +95,23 @@ pub(super) struct Header {
     pub from_step: u64,
 }
 
+impl Header {
+    /// Whether radii and box can be those of the scene, before anything is built of what the scene claims.
+    pub fn check(&self, path: &str) -> Result<(), ReadError> {
+        let (claimed, held) = (self.scene.particles, self.radii.len());
+        let phi = coverage(&self.radii, self.domain);
+        let problem = if self.scene.starts_from_disks() && claimed != held {
+            format!("the scene has {claimed} particles, the file holds radii of {held}")
+        } else if phi > 0.0 && phi < 1.3 + 1e-9 {
+            return Ok(());
+        } else {
+            format!("the coverage of its radii is φ = {phi:e}, that of a scene is 0 < φ < 1.3")
+        };
+        let path = path.to_owned();
+        Err(ReadError::Particles { path, problem })
+    }
+}
+
 /// Refuses a layout that was made after this program.
 pub(super) fn check_version(path: &str, found: u32) -> Result<(), ReadError> {
     if found > FORMAT_VERSION {
@@ -88,7 +128,8 @@ pub(super) fn check_version(path: &str, found: u32) -> Result<(), ReadError> {
 ///
 /// A recording that does not say when pictures are drawn anew has every one of them.
 pub(super) fn read_scene(path: &str, toml: &str) -> Result<(Scene, [u8; 32]), ReadError> {
-    let mut scene = Scene::from_toml(toml).map_err(|source| ReadError::Scene {
+    let scene = SceneFields::from_recording(toml).and_then(SceneFields::into_scene);
+    let mut scene = scene.map_err(|source| ReadError::Scene {
         path: path.to_owned(),
         source,
     })?;
@@ -120,14 +161,14 @@ thread_local! {
 }
 
 /// Runs the decoding of somebody else's bytes. Decoders panic at some that are damaged; here that is an error like others.
-pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(crate) fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     let before = GUARDED.replace(true);
     let result = std::panic::catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(before);
     result.unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        Err(text.unwrap_or("it cannot be decoded").to_owned())
+        Err(shown(text.unwrap_or("it cannot be decoded")))
     })
 }
 

@@ -7,6 +7,8 @@ use crate::disks::DiskParameters;
 use crate::droplet::contour::ContourStyle;
 use crate::force::Form;
 use crate::relax::fire::Fire;
+use std::io::Read as _;
+use std::path::Path;
 
 /// The fields of a scene file, each of which may be missing. Whole numbers are signed here, so that a negative one is
 /// answered with the allowed range.
@@ -77,6 +79,52 @@ impl SceneFields {
     /// See the example of [`SceneFields`].
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
         Ok(toml::from_str(text)?)
+    }
+
+    /// The fields that a scene file names. No more of it is read than a scene may have.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Read`] if there is no such file, [`SceneError::Text`] if it is too long or not UTF-8, [`SceneError::Toml`] as
+    /// [`from_toml`](Self::from_toml).
+    ///
+    /// ```
+    /// use softjam::scene::SceneFields;
+    ///
+    /// let path = std::env::temp_dir().join("softjam-scene-read-example.toml");
+    /// std::fs::write(&path, "phi = 0.9").unwrap();
+    /// assert_eq!(SceneFields::read(&path).unwrap().phi, Some(0.9));
+    /// std::fs::write(&path, b"phi = \xff").unwrap();
+    /// let error = SceneFields::read(&path).unwrap_err();
+    /// assert_eq!(error.to_string(), "not a scene: byte 6 is not UTF-8 text");
+    /// # std::fs::remove_file(&path).unwrap();
+    /// ```
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let mut bytes = Vec::new();
+        std::fs::File::open(path.as_ref())
+            .and_then(|file| file.take(LONGEST_SCENE as u64 + 1).read_to_end(&mut bytes))
+            .map_err(|source| SceneError::Read {
+                path: path.as_ref().display().to_string(),
+                source,
+            })?;
+        check_length(bytes.len())?;
+        let text = str::from_utf8(&bytes).map_err(|error| SceneError::Text {
+            problem: format!("byte {} is not UTF-8 text", error.valid_up_to()),
+        })?;
+        Self::from_toml(text)
+    }
+
+    /// The fields of the scene in a recording; what is wrong with it is told in one line.
+    #[cfg(feature = "recording")]
+    pub(crate) fn from_recording(text: &str) -> Result<Self, SceneError> {
+        check_length(text.len())?;
+        toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let line = 1 + text.bytes().take(start).filter(|b| *b == b'\n').count();
+            SceneError::Text {
+                problem: format!("line {line}: {}", error.message()),
+            }
+        })
     }
 
     /// These fields, each replaced where `flags` has a value. Radii and start are replaced as a whole.
@@ -251,6 +299,17 @@ impl SceneFields {
             (None, None) => Ok(Radii::default()),
         }
     }
+}
+
+/// Bytes of the longest scene; one with every field written out has some five thousand.
+const LONGEST_SCENE: usize = 1 << 20;
+
+fn check_length(bytes: usize) -> Result<(), SceneError> {
+    if bytes <= LONGEST_SCENE {
+        return Ok(());
+    }
+    let problem = format!("longer than {LONGEST_SCENE} bytes, which no scene is");
+    Err(SceneError::Text { problem })
 }
 
 /// A whole number that may be missing; `least` is its lower bound.

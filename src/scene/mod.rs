@@ -31,6 +31,7 @@ use crate::disks::DiskParameters;
 use crate::droplet::contour::ContourStyle;
 use crate::force::Form;
 use crate::relax::fire::Fire;
+use crate::text::{lines, shown};
 
 /// One kind of particle in a mixture.
 ///
@@ -217,7 +218,7 @@ impl Default for Scene {
 #[non_exhaustive]
 pub enum SceneError {
     /// A field is out of its range.
-    #[error("{field} = {value} is outside {allowed}")]
+    #[error("{} = {} is outside {allowed}", shown(.field), shown(.value))]
     Range {
         /// The field, as it is called in the scene file.
         field: String,
@@ -227,7 +228,7 @@ pub enum SceneError {
         allowed: String,
     },
     /// Two fields contradict each other.
-    #[error("{field} = {value} cannot be given together with {with}: {why}")]
+    #[error("{field} = {} cannot be given together with {}: {why}", shown(.value), shown(.with))]
     Conflict {
         /// The field.
         field: String,
@@ -239,7 +240,7 @@ pub enum SceneError {
         why: String,
     },
     /// A field makes no sense without another.
-    #[error("{field} = {value} needs {needs}")]
+    #[error("{field} = {} needs {needs}", shown(.value))]
     Needs {
         /// The field.
         field: String,
@@ -249,8 +250,14 @@ pub enum SceneError {
         needs: String,
     },
     /// The text is not a scene: a misspelt field, a value of the wrong kind, broken TOML.
-    #[error("not a scene:\n{0}")]
+    #[error("not a scene:\n{}", each_line(.0))]
     Toml(#[from] toml::de::Error),
+    /// It is no text that could be a scene.
+    #[error("not a scene: {}", shown(.problem))]
+    Text {
+        /// What is wrong with it.
+        problem: String,
+    },
     /// The box is too small for the minimum image.
     #[error(
         "particles = {particles} with phi = {phi} and aspect = {aspect} give a box of {length_x:.4} × {length_y:.4}, \
@@ -284,7 +291,7 @@ pub enum SceneError {
         available_mib: u64,
     },
     /// The start file is not a packing.
-    #[error("start file {path}{}: {problem}", at_line(*line))]
+    #[error("start file {}{}: {}", shown(.path), at_line(*line), lines(.problem))]
     StartFile {
         /// Path of the file.
         path: String,
@@ -294,13 +301,20 @@ pub enum SceneError {
         problem: String,
     },
     /// A file could not be read.
-    #[error("cannot read {path}: {source}")]
+    #[error("cannot read {}: {source}", shown(.path))]
     Read {
         /// Path of the file.
         path: String,
         /// The system's reason.
         source: std::io::Error,
     },
+}
+
+/// The lines of a message that quotes a file.
+fn each_line(error: &toml::de::Error) -> String {
+    let text = error.to_string();
+    let lines: Vec<String> = text.lines().map(shown).collect();
+    lines.join("\n")
 }
 
 fn at_line(line: u64) -> String {

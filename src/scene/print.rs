@@ -1,6 +1,7 @@
 //! The scene as a commented TOML text.
 
 use super::{Radii, Scene, Start};
+use crate::text::is_hidden;
 use core::fmt::Write as _;
 
 impl Scene {
@@ -201,8 +202,23 @@ fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
+/// A string on one line; characters that are not seen are written as TOML's escapes.
 fn quoted(text: &str) -> String {
-    toml::Value::String(text.into()).to_string()
+    if !text.contains(is_hidden) {
+        return toml::Value::String(text.into()).to_string();
+    }
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if is_hidden(c) => {
+                let _ = write!(quoted, "\\U{:08X}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
 }
 
 /// A unit variant in its name in the file.

@@ -2,8 +2,10 @@
 
 use super::start::is_small;
 use super::{SceneError, Start};
+use crate::crowding;
 use crate::domain::{Domain, Vec2};
 use crate::packing::{Packing, PackingError};
+use crate::text::shown;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -11,7 +13,7 @@ use std::path::Path;
 ///
 /// # Errors
 ///
-/// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic.
+/// As [`read_csv`], and [`SceneError::StartFile`] if the box is too small to be periodic or particles lie on each other.
 pub(super) fn of_scene(path: &Path, blake3: Option<&str>) -> Result<Packing, SceneError> {
     packing_of(path, &read_file(path)?, blake3)
 }
@@ -58,6 +60,19 @@ fn packing_of(path: &Path, bytes: &[u8], blake3: Option<&str>) -> Result<Packing
         );
         return Err(SceneError::StartFile {
             path: path.display().to_string(),
+            line: 0,
+            problem,
+        });
+    }
+    if let Err(crowd) = crowding::pairs(&packing) {
+        let problem = format!(
+            "{} particles overlap particle {}, where a packing has room for some dozens: nothing says in which direction they part; \
+             give each a place of its own",
+            crowd.others, crowd.particle
+        );
+        let path = path.display().to_string();
+        return Err(SceneError::StartFile {
+            path,
             line: 0,
             problem,
         });
@@ -115,7 +130,8 @@ fn checked(path: &Path, bytes: &[u8], blake3: Option<&str>) -> Result<Packing, S
         return Err(wrong(
             0,
             format!(
-                "its BLAKE3 is {found}, the scene asks for {asked}: this is not the file that the scene was made with"
+                "its BLAKE3 is {found}, the scene asks for {}: this is not the file that the scene was made with",
+                shown(asked)
             ),
         ));
     }
@@ -177,15 +193,31 @@ fn reader(text: &str) -> csv::Reader<&[u8]> {
 /// A start file of the largest packing is about half as long.
 const LARGEST_FILE: u64 = 1 << 30;
 
+/// Bytes that are looked at before the rest is read.
+const BEGINNING: u64 = 1 << 12;
+
 /// The bytes of a start file, one more than [`LARGEST_FILE`] at most.
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let name = || path.display().to_string();
+    let unreadable = |source| SceneError::Read {
+        path: name(),
+        source,
+    };
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(|source| SceneError::Read {
-            path: path.display().to_string(),
-            source,
-        })?;
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    // A device that never ends shows itself at once.
+    for most in [BEGINNING, LARGEST_FILE + 1 - BEGINNING] {
+        let read = file.by_ref().take(most).read_to_end(&mut bytes);
+        read.map_err(unreadable)?;
+        let beginning = bytes.iter().take(BEGINNING as usize);
+        if let Some(place) = beginning.copied().position(|byte| byte == 0) {
+            return Err(SceneError::StartFile {
+                path: name(),
+                line: 0,
+                problem: format!("byte {place} is 0, which no text holds"),
+            });
+        }
+    }
     Ok(bytes)
 }
 
@@ -216,16 +248,10 @@ fn line_of(text: &str, particle: usize) -> u64 {
     row(text, record.as_ref().and_then(|r| r.position())).0
 }
 
-/// The beginning of a line, fit for a terminal.
+/// The beginning of a line.
 fn quote(line: &str) -> String {
-    match line.char_indices().nth(QUOTED) {
-        Some((end, _)) => format!("`{}…`", line[..end].escape_debug()),
-        None => format!("`{}`", line.escape_debug()),
-    }
+    format!("`{}`", shown(line))
 }
-
-/// Characters of a line that a message quotes at most.
-const QUOTED: usize = 60;
 
 /// The sides of the box from the comment `# box = L_x, L_y`.
 fn csv_box(text: &str) -> Result<Domain, (u64, String)> {
@@ -326,7 +352,5 @@ mod tests {
                 assert!(problem.chars().all(plain), "{problem:?}");
             }
         }
-        assert_eq!(quote(&"7".repeat(60)), format!("`{}`", "7".repeat(60)));
-        assert_eq!(quote(&"7".repeat(61)), format!("`{}…`", "7".repeat(60)));
     }
 }

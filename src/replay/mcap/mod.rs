@@ -4,6 +4,7 @@ mod stream;
 
 use super::ReadError;
 use super::source::{Ending, Header, Item, Problem, Source, check_version, particles, read_scene};
+use crate::budget::Budget;
 use crate::domain::{Domain, Vec2};
 use crate::force::METRICS;
 use crate::frame::Frame;
@@ -13,6 +14,7 @@ use crate::record::messages::{
 };
 use crate::relax::fire::FireState;
 use crate::scene::Scene;
+use crate::text::shown;
 use mcap::records::{Channel, MessageHeader, Record};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -39,6 +41,7 @@ struct Topics(BTreeMap<u16, String>);
 impl Topics {
     fn add(&mut self, channel: Channel) -> Result<(), String> {
         let Channel { id, topic, .. } = channel;
+        let topic = shown(&topic);
         match self.0.insert(id, topic) {
             Some(before) if before != self.0[&id] => {
                 Err(format!("topic {id} is {before} and then {}", self.0[&id]))
@@ -66,6 +69,7 @@ impl McapSource {
         path: &str,
         source: Box<dyn Read + Send>,
         length: u64,
+        budget: Budget,
     ) -> Result<(Self, Header), ReadError> {
         let not_mcap = |problem| ReadError::Format {
             path: path.to_owned(),
@@ -76,7 +80,7 @@ impl McapSource {
             path: path.to_owned(),
             missing,
         };
-        let mut stream = Stream::open(source, length).map_err(not_mcap)?;
+        let mut stream = Stream::open(source, length, budget).map_err(not_mcap)?;
         let mut topics = Topics::default();
         let mut about: Option<About> = None;
         let mut toml: Option<String> = None;
@@ -101,7 +105,8 @@ impl McapSource {
                 };
                 return Ok((source, header));
             }
-            match stream.next().map_err(not_mcap)? {
+            let record = stream.next();
+            match record.map_err(|problem| problem.at_start(path, not_mcap))? {
                 Some(Record::Metadata(data)) if data.name == ABOUT => {
                     about =
                         Some(read_about(path, &data.metadata)?.ok_or(missing("format version"))?);
@@ -143,7 +148,7 @@ fn read_about(path: &str, metadata: &BTreeMap<String, String>) -> Result<Option<
     };
     check_version(path, version)?;
     Ok(Some(About {
-        program: text("program"),
+        program: shown(&text("program")),
         scene_digest: text("scene_digest"),
         bits: text("bits").parse().unwrap_or(1),
         from_step: text("from_step").parse().unwrap_or(0),

@@ -3,7 +3,9 @@
 //! The file is framed here because the library's reader allocates what a record claims to be long and takes a file that
 //! breaks off for a broken one. The records themselves are decoded by the library.
 
-use crate::replay::source::{Ending, guarded};
+use crate::budget::Budget;
+use crate::replay::source::{Ending, Problem, guarded};
+use crate::text::shown;
 use mcap::MAGIC;
 use mcap::records::{ChunkHeader, Record, op};
 use rerun::external::re_log_encoding::external::lz4_flex;
@@ -21,19 +23,15 @@ pub(super) struct Stream {
     ending: Option<Ending>,
     /// The unpacked chunk that is being read, and how far.
     chunk: Cursor<Vec<u8>>,
+    budget: Budget,
 }
 
 /// Bytes of an operation code and a length.
 const HEAD: usize = 9;
 
-/// Unpacked bytes of a chunk that are believed without asking how many packed ones there are.
-const SMALL: u64 = 1 << 24;
-/// Beyond that, the largest ratio of unpacked to packed bytes. Particles that do not move yet pack best, at about 10.
-const LARGEST_RATIO: u64 = 64;
-
 impl Stream {
     /// Starts to read a source of `length` bytes.
-    pub fn open(source: Box<dyn Read + Send>, length: u64) -> Result<Self, String> {
+    pub fn open(source: Box<dyn Read + Send>, length: u64, budget: Budget) -> Result<Self, String> {
         let mut stream = Self {
             source,
             length,
@@ -42,6 +40,7 @@ impl Stream {
             checksum: crc32fast::Hasher::new(),
             ending: None,
             chunk: Cursor::default(),
+            budget,
         };
         if !stream.read(MAGIC.len() as u64)? || stream.bytes != MAGIC {
             return Err("it does not begin like one".to_owned());
@@ -56,7 +55,7 @@ impl Stream {
     }
 
     /// The next record of the data section, chunks taken apart; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<Record<'static>>, String> {
+    pub fn next(&mut self) -> Result<Option<Record<'static>>, Problem> {
         loop {
             if let Some(record) = self.next_in_chunk()? {
                 return Ok(Some(record));
@@ -74,11 +73,13 @@ impl Stream {
                     let saved = end.data_section_crc;
                     let checksum = core::mem::take(&mut self.checksum).finalize();
                     if saved != 0 && saved != checksum {
-                        return Err("the checksum over the data is wrong".to_owned());
+                        return Err("the checksum over the data is wrong".to_owned().into());
                     }
                     return self.read_summary();
                 }
                 Record::Chunk { header, data } => {
+                    let name = format_args!("the chunk at byte {start}, unpacked,");
+                    self.budget.allow_piece(name, header.uncompressed_size)?;
                     self.chunk = Cursor::new(unpack(&header, &data).map_err(at)?);
                 }
                 // What points at other records; the records are read in their order.
@@ -105,7 +106,7 @@ impl Stream {
     }
 
     /// Reads a record whole; its operation code, or `None` where the file breaks off.
-    fn next_outside(&mut self) -> Result<Option<u8>, String> {
+    fn next_outside(&mut self) -> Result<Option<u8>, Problem> {
         if self.ending.is_some() {
             return Ok(None);
         }
@@ -113,8 +114,12 @@ impl Stream {
         if self.read(HEAD as u64)? {
             let head = self.bytes.first_chunk::<HEAD>();
             // A length beyond any machine's memory lies behind the end of any file.
-            let body = head.and_then(length).unwrap_or(usize::MAX);
-            if self.read(body as u64)? {
+            let body = head.and_then(length).unwrap_or(usize::MAX) as u64;
+            if body <= self.length - self.offset {
+                let start = self.offset - HEAD as u64;
+                let name = format_args!("the record at byte {start}");
+                self.budget.allow_piece(name, body)?;
+                self.read(body)?;
                 return Ok(self.bytes.first().copied());
             }
         }
@@ -123,32 +128,33 @@ impl Stream {
     }
 
     /// Behind the data: indexes, which are not needed, a footer with a checksum over them, and nothing else.
-    fn read_summary(&mut self) -> Result<Option<Record<'static>>, String> {
+    fn read_summary(&mut self) -> Result<Option<Record<'static>>, Problem> {
         while let Some(opcode) = self.next_outside()? {
             if opcode != op::FOOTER {
                 self.checksum.update(&self.bytes);
                 continue;
             }
             let Record::Footer(footer) = parse(opcode, &self.bytes[HEAD..])? else {
-                return Err("its footer is not one".to_owned());
+                return Err("its footer is not one".to_owned().into());
             };
             self.checksum.update(&self.bytes[..HEAD + 16]);
             let checksum = core::mem::take(&mut self.checksum).finalize();
             if footer.summary_crc != 0 && footer.summary_crc != checksum {
-                return Err("the checksum over the summary is wrong".to_owned());
+                return Err("the checksum over the summary is wrong".to_owned().into());
             }
             self.bytes.clear();
             if !self.read(MAGIC.len() as u64)? {
                 break;
             }
             if self.bytes != MAGIC {
-                return Err("it does not end like an MCAP file".to_owned());
+                return Err("it does not end like an MCAP file".to_owned().into());
             }
             if self.offset < self.length {
                 return Err(format!(
                     "{} bytes follow the end of the recording: several files in one?",
                     self.length - self.offset
-                ));
+                )
+                .into());
             }
             self.ending = Some(Ending::Closed);
             return Ok(None);
@@ -187,10 +193,7 @@ fn parse(opcode: u8, body: &[u8]) -> Result<Record<'static>, String> {
 
 /// The records in a chunk, which its checksum covers.
 fn unpack(header: &ChunkHeader, packed: &[u8]) -> Result<Vec<u8>, String> {
-    let (held, claimed) = (packed.len() as u64, header.uncompressed_size);
-    if claimed > SMALL.max(LARGEST_RATIO * held) {
-        return Err(format!("a chunk of {held} bytes claims to hold {claimed}"));
-    }
+    let claimed = header.uncompressed_size;
     let mut bytes = Vec::new();
     let wrong = |e: std::io::Error| format!("a chunk cannot be unpacked: {e}");
     // One byte more than claimed is one too many.
@@ -204,7 +207,8 @@ fn unpack(header: &ChunkHeader, packed: &[u8]) -> Result<Vec<u8>, String> {
             .read_to_end(&mut bytes),
         other => {
             return Err(format!(
-                "a chunk is packed with {other}, which is not known here"
+                "a chunk is packed with {}, which is not known here",
+                shown(other)
             ));
         }
     }

@@ -7,6 +7,7 @@ use crate::record::id_of;
 use crate::replay::ReadError;
 use crate::replay::source::{Header, check_version, guarded, particles, read_scene};
 use crate::scene::Scene;
+use crate::text::shown;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::Chunk;
 
@@ -28,7 +29,9 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
     };
     let mut about = None;
     loop {
-        let message = stream.next().map_err(|problem| not_rrd(path, problem))?;
+        let message = stream.next();
+        let message =
+            message.map_err(|problem| problem.at_start(path, |damage| not_rrd(path, damage)))?;
         let Some(message) = message else {
             return Err(missing(if about.is_some() { "radii" } else { "scene" }));
         };
@@ -93,7 +96,7 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
     Ok(Some(About {
         scene,
         id: id_of(digest),
-        program: text("softjam.Scene:program").unwrap_or_default(),
+        program: shown(&text("softjam.Scene:program").unwrap_or_default()),
         bits: bits.next().and_then(|l| l.first().copied()).unwrap_or(1),
         from_step: from_steps
             .next()

@@ -5,6 +5,7 @@ mod stream;
 
 use super::ReadError;
 use super::source::{Ending, Header, Item, Problem, Source, guarded};
+use crate::budget::Budget;
 use crate::domain::Vec2;
 use crate::force::METRICS;
 use crate::frame::Frame;
@@ -23,6 +24,7 @@ pub(super) const MAGIC: &[u8] = &rerun::external::re_log_encoding::rrd::RRD_FOUR
 pub(super) struct RrdSource {
     stream: Stream,
     store: StoreId,
+    budget: Budget,
 }
 
 impl RrdSource {
@@ -31,10 +33,17 @@ impl RrdSource {
         path: &str,
         source: Box<dyn Read + Send>,
         length: u64,
+        budget: Budget,
     ) -> Result<(Self, Header), ReadError> {
-        let mut stream = Stream::open(source, length).map_err(|problem| not_rrd(path, problem))?;
+        let mut stream =
+            Stream::open(source, length, budget).map_err(|problem| not_rrd(path, problem))?;
         let (store, header) = header::read(path, &mut stream)?;
-        Ok((Self { stream, store }, header))
+        let source = Self {
+            stream,
+            store,
+            budget,
+        };
+        Ok((source, header))
     }
 }
 
@@ -56,9 +65,11 @@ impl Source for RrdSource {
             Message::Layout => {}
             Message::Chunk(store, chunk) => {
                 if store != self.store {
-                    let problem = format!("rows of another recording, {store:?}");
+                    let problem = format!("rows of another recording, {}", store.recording_id());
                     return Err(Problem::Damage(problem));
                 }
+                let size = (chunk.num_rows() * size_of::<Item>()) as u64;
+                self.budget.allow_piece("a message of so many rows", size)?;
                 guarded(|| take_apart(&chunk, items))?;
             }
         }

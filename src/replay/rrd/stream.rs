@@ -4,7 +4,8 @@
 //! compressed message claims to need. A recording that is to be trusted needs to know. The messages themselves are
 //! decoded by rerun.
 
-use crate::replay::source::{Ending, guarded};
+use crate::budget::Budget;
+use crate::replay::source::{Ending, Problem, guarded};
 use re_protos::common::v1alpha1::Compression;
 use re_protos::log_msg::v1alpha1::ArrowMsg;
 use re_protos::log_msg::v1alpha1::log_msg::Msg;
@@ -27,6 +28,7 @@ pub(super) struct Stream {
     ending: Option<Ending>,
     /// Whether it says that its messages are not compressed, as softjam's are.
     plain: bool,
+    budget: Budget,
 }
 
 /// A message that matters here.
@@ -41,7 +43,11 @@ pub(super) enum Message {
 
 impl Stream {
     /// Starts to read a source of `length` bytes.
-    pub fn open(mut source: Box<dyn Read + Send>, length: u64) -> Result<Self, String> {
+    pub fn open(
+        mut source: Box<dyn Read + Send>,
+        length: u64,
+        budget: Budget,
+    ) -> Result<Self, String> {
         let mut header = [0; StreamHeader::ENCODED_SIZE_BYTES];
         if length == 0 {
             return Err("the file is empty".to_owned());
@@ -59,6 +65,7 @@ impl Stream {
             bytes: Vec::new(),
             ending: None,
             plain: options.compression == StreamCompression::Off,
+            budget,
         })
     }
 
@@ -73,7 +80,7 @@ impl Stream {
     }
 
     /// The next message; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<Message>, String> {
+    pub fn next(&mut self) -> Result<Option<Message>, Problem> {
         if self.ending.is_some() {
             return Ok(None);
         }
@@ -91,9 +98,11 @@ impl Stream {
             self.ending = Some(Ending::BreaksOff);
             return Ok(None);
         }
+        let name = format_args!("the message at byte {start}");
+        self.budget.allow_piece(name, header.len)?;
         self.read(header.len)?;
         if matches!(header.kind, MessageKind::End) {
-            return self.close();
+            return Ok(self.close()?);
         }
         let message = Option::<Msg>::from_rrd_bytes(&self.bytes).map_err(|e| at(e.to_string()))?;
         match message {
@@ -103,6 +112,10 @@ impl Stream {
                 let store = StoreId::try_from(store).map_err(|e| at(e.to_string()))?;
                 if store.kind() != StoreKind::Recording {
                     return Ok(Some(Message::Layout));
+                }
+                if arrow.compression() == Compression::Lz4 {
+                    let name = format_args!("the message at byte {start}, unpacked,");
+                    self.budget.allow_piece(name, arrow.uncompressed_size)?;
                 }
                 let chunk = guarded(|| {
                     decompress(&mut arrow)?;
@@ -162,19 +175,12 @@ impl Stream {
     }
 }
 
-/// Uncompressed and compressed bytes of an LZ4 block are in no greater ratio.
-const LARGEST_RATIO: u64 = 255;
-
 /// Replaces a payload that rerun's tools have compressed; softjam's own are not.
 fn decompress(arrow: &mut ArrowMsg) -> Result<(), String> {
     if arrow.compression() != Compression::Lz4 {
         return Ok(());
     }
-    let (held, claimed) = (arrow.payload.len() as u64, arrow.uncompressed_size);
-    if claimed > LARGEST_RATIO * held {
-        return Err(format!("{held} bytes claim to hold {claimed}"));
-    }
-    let bytes = lz4_flex::block::decompress(&arrow.payload, claimed as usize);
+    let bytes = lz4_flex::block::decompress(&arrow.payload, arrow.uncompressed_size as usize);
     arrow.payload = bytes.map_err(|e| e.to_string())?.into();
     arrow.set_compression(Compression::None);
     Ok(())

@@ -1,0 +1,243 @@
+//! Particles that lie on each other as no packing has them: looked for before anything is built from positions of a file.
+//!
+//! Each pair is counted at its smaller particle. That bounds the number of pairs by [`MOST`] times that of the particles,
+//! whatever their sizes; among the few particles that fit around one without overlap, six are no smaller.
+
+use crate::domain::{Domain, Vec2};
+use crate::packing::Packing;
+use std::collections::BTreeMap;
+
+/// Particles no smaller than itself that a particle may overlap or touch. Centres strewn at random at φ = 1.3 come to about 5 on
+/// average, and to some 25 in ten million.
+pub(crate) const MOST: usize = 64;
+
+/// A particle that overlaps too many others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Crowd {
+    pub particle: usize,
+    /// How many others overlap it.
+    pub others: usize,
+}
+
+/// The number of pairs of overlapping disks, or the first particle found that overlaps more than [`MOST`] which are no smaller. Memory is
+/// proportional to the number of particles, and coincident ones are found at once.
+pub(crate) fn pairs(packing: &Packing) -> Result<usize, Crowd> {
+    // By size, in octaves: cells that suit the large would hold any number of small ones.
+    let mut octaves: BTreeMap<u64, Vec<Seat>> = BTreeMap::new();
+    let particles = packing.positions().iter().zip(packing.radii());
+    for (particle, (&at, &radius)) in (0..).zip(particles) {
+        let exponent = radius.to_bits() >> 52;
+        octaves.entry(exponent).or_default().push(Seat {
+            at,
+            radius,
+            particle,
+        });
+    }
+    let domain = packing.domain();
+    let grids: Vec<Grid> = octaves.values().map(|s| Grid::new(domain, s)).collect();
+    let mut pairs = 0;
+    for (k, small) in grids.iter().enumerate() {
+        for seat in &small.seats {
+            let mut larger = 0;
+            for grid in &grids[k..] {
+                let (no_smaller, counted) = grid.around(domain, seat, MOST - larger);
+                (larger, pairs) = (larger + no_smaller, pairs + counted);
+                if larger > MOST {
+                    return Err(Crowd::of(packing, seat.particle as usize));
+                }
+            }
+        }
+    }
+    Ok(pairs)
+}
+
+/// The first particle that more than [`MOST`] of `contacts` join to particles which are no smaller.
+#[cfg(feature = "recording")]
+pub(crate) fn contacts(radii: &[f64], contacts: &[[u32; 2]]) -> Option<Crowd> {
+    let mut counts = vec![[0_u32; 2]; radii.len()];
+    for &[i, j] in contacts {
+        let (i, j) = (i as usize, j as usize);
+        counts[i][1] += 1;
+        counts[j][1] += 1;
+        counts[i][0] += u32::from(radii[j] >= radii[i]);
+        counts[j][0] += u32::from(radii[i] >= radii[j]);
+    }
+    let particle = counts.iter().position(|c| c[0] as usize > MOST)?;
+    let others = counts[particle][1] as usize;
+    Some(Crowd { particle, others })
+}
+
+impl Crowd {
+    fn of(packing: &Packing, particle: usize) -> Self {
+        let radii = packing.radii();
+        let overlaps = |j: &usize| {
+            let sum = radii[particle] + radii[*j];
+            *j != particle && packing.separation(particle, *j).norm_squared() < sum * sum
+        };
+        let others = (0..packing.len()).filter(overlaps).count();
+        Self { particle, others }
+    }
+}
+
+#[derive(Clone, Copy, Default)]
+struct Seat {
+    at: Vec2,
+    radius: f64,
+    particle: u32,
+}
+
+/// Particles of about one size in cells no narrower than two of their diameters can reach: O(N) of them at most.
+struct Grid {
+    columns: usize,
+    rows: usize,
+    per_length: Vec2,
+    seats: Vec<Seat>,
+    /// Cell c has `seats[first[c]..first[c + 1]]`.
+    first: Vec<u32>,
+}
+
+impl Grid {
+    fn new(domain: Domain, particles: &[Seat]) -> Self {
+        let largest = particles
+            .iter()
+            .fold(0.0, |m: f64, seat| m.max(seat.radius));
+        let lengths = domain.lengths();
+        // A float too large for the type becomes the largest number there is.
+        let count = |length: f64, most: usize| ((length / (2.0 * largest)) as usize).clamp(1, most);
+        let columns = count(lengths.x, particles.len());
+        let rows = count(lengths.y, particles.len().div_ceil(columns));
+        let mut grid = Self {
+            columns,
+            rows,
+            per_length: Vec2::new(columns as f64, rows as f64).component_div(&lengths),
+            seats: vec![Seat::default(); particles.len()],
+            first: vec![0; columns * rows + 1],
+        };
+        let cells: Vec<usize> = particles.iter().map(|seat| grid.cell(seat.at)).collect();
+        for cell in &cells {
+            grid.first[*cell] += 1;
+        }
+        let mut end = 0;
+        for count in &mut grid.first {
+            end += *count;
+            *count = end;
+        }
+        for (seat, cell) in particles.iter().zip(cells).rev() {
+            grid.first[cell] -= 1;
+            grid.seats[grid.first[cell] as usize] = *seat;
+        }
+        grid
+    }
+
+    fn place(&self, at: Vec2) -> (usize, usize) {
+        let at = at.component_mul(&self.per_length);
+        let (column, row) = (at.x as usize, at.y as usize);
+        // A product may round up to the number of cells.
+        (column.min(self.columns - 1), row.min(self.rows - 1))
+    }
+
+    fn cell(&self, at: Vec2) -> usize {
+        let (column, row) = self.place(at);
+        row * self.columns + column
+    }
+
+    /// How many particles that are no smaller overlap `seat`, and how many of these pairs count here: one of equals at its lower
+    /// particle. Ends when there are more than `enough`.
+    fn around(&self, domain: Domain, seat: &Seat, enough: usize) -> (usize, usize) {
+        let (column, row) = self.place(seat.at);
+        let (mut no_smaller, mut counted) = (0, 0);
+        for row in neighbors(row, self.rows) {
+            for column in neighbors(column, self.columns) {
+                let cell = row * self.columns + column;
+                let others = self.first[cell] as usize..self.first[cell + 1] as usize;
+                for other in &self.seats[others] {
+                    let sum = seat.radius + other.radius;
+                    let near = domain.minimum_image(seat.at - other.at).norm_squared() < sum * sum;
+                    if near && other.radius >= seat.radius && other.particle != seat.particle {
+                        no_smaller += 1;
+                        let first = seat.particle < other.particle;
+                        counted += usize::from(other.radius > seat.radius || first);
+                        if no_smaller > enough {
+                            return (no_smaller, counted);
+                        }
+                    }
+                }
+            }
+        }
+        (no_smaller, counted)
+    }
+}
+
+/// The number of a cell and of those beside it along a periodic line, each once.
+fn neighbors(place: usize, cells: usize) -> impl Iterator<Item = usize> {
+    (0..cells.min(3)).map(move |k| (place + cells + k - usize::from(cells > 1)) % cells)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn packing(points: &[(f64, f64, f64)], (x, y): (f64, f64)) -> Packing {
+        let radii = points.iter().map(|p| p.2).collect();
+        let at = points.iter().map(|p| Vec2::new(p.0 * x, p.1 * y)).collect();
+        Packing::new(Domain::new(x, y).unwrap(), radii, at).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn pairs_are_those_that_a_search_of_all_finds(
+            points in prop::collection::vec((0.0..1.0f64, 0.0..1.0f64, 0.01..0.7f64), 1..60),
+            aspect in 0.05..2.0f64,
+        ) {
+            let packing = packing(&points, (6.0 * aspect, 6.0));
+            let radii = packing.radii();
+            let overlap = |i: usize, j: usize| {
+                let sum = radii[i] + radii[j];
+                packing.separation(i, j).norm_squared() < sum * sum
+            };
+            let n = packing.len();
+            let all = (0..n).map(|i| (i + 1..n).filter(|&j| overlap(i, j)).count()).sum();
+            prop_assert_eq!(pairs(&packing), Ok(all));
+        }
+    }
+
+    #[test]
+    fn coincident_particles_are_found_at_once_and_a_speck_beside_them_changes_nothing() {
+        let mut points = vec![(0.5, 0.5, 0.5); 100_000];
+        for speck in [false, true] {
+            if speck {
+                points.push((0.1, 0.1, 1e-9));
+            }
+            let packing = packing(&points, (400.0, 400.0));
+            let crowd = pairs(&packing).unwrap_err();
+            assert_eq!(crowd.others, 99_999);
+        }
+    }
+
+    #[test]
+    fn small_particles_around_a_large_one_are_no_crowd() {
+        let around = |k: usize| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * k as f64 / 3000.0);
+            (0.5 + 0.1 * cos, 0.5 + 0.1 * sin, 0.001)
+        };
+        let mut points: Vec<_> = (0..3000).map(around).collect();
+        points.push((0.5, 0.5, 1.0));
+        let packing = packing(&points, (10.0, 10.0));
+        assert!(pairs(&packing).unwrap() >= 3000);
+    }
+
+    #[test]
+    #[cfg(feature = "recording")]
+    fn contacts_are_counted_at_the_smaller_particle() {
+        let star: Vec<[u32; 2]> = (1..=100).map(|j| [0, j]).collect();
+        let mut radii = vec![1.0; 101];
+        let crowd = Crowd {
+            particle: 0,
+            others: 100,
+        };
+        assert_eq!(contacts(&radii, &star), Some(crowd));
+        radii[0] = 1.1;
+        assert_eq!(contacts(&radii, &star), None);
+    }
+}
