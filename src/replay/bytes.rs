@@ -57,11 +57,7 @@ enum Message {
 
 impl Recording {
     /// Begins with the header; `file` is the whole file, from its first byte.
-    pub fn begin(
-        format: Format,
-        header: Header,
-        file: Box<dyn Read + Send>,
-    ) -> io::Result<Self> {
+    pub fn begin(format: Format, header: Header, file: Box<dyn Read + Send>) -> io::Result<Self> {
         let (queue, messages) = sync_channel(WAITING);
         let thread = std::thread::Builder::new()
             .name("softjam-comparison".to_owned())
@@ -163,9 +159,9 @@ impl Write for Sink<'_> {
         if ours != self.theirs {
             let differ = ours.iter().zip(&self.theirs).map(|(a, b)| a != b);
             let first = differ.clone().position(|differs| differs);
-            found.first = found
-                .first
-                .or(Some(found.bytes + first.unwrap_or(self.theirs.len()) as u64));
+            found.first = found.first.or(Some(
+                found.bytes + first.unwrap_or(self.theirs.len()) as u64,
+            ));
             found.differing += differ.filter(|differs| *differs).count() as u64;
         }
         found.bytes += self.theirs.len() as u64;

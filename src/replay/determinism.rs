@@ -5,9 +5,11 @@
 //! the next and the first frame is the scene's, the whole is the scene's. Every row of the metrics has to stand there once, the
 //! result has to be where and how this run ends, and the file's bytes have to be those that it writes.
 
+use super::balance::Worst;
 use super::bytes;
-use super::difference::Difference;
+use super::difference::{Difference, What};
 use super::ledger::Ledger;
+use super::tolerance;
 use super::walk::{End, Segment};
 use super::{ReadError, Recording, State};
 use crate::record::Snapshots;
@@ -48,6 +50,9 @@ pub struct Determinism {
     pub origin: Origin,
     /// The first difference, if there is one.
     pub difference: Option<Difference>,
+    /// How far a recording of another [revision of the bits](crate::BITS) is off at worst, between recorded states: positions by
+    /// the mean radius, forces by the largest.
+    pub deviation: Option<Worst>,
     /// What the comparison of the bytes came to.
     pub bytes: Bytes,
 }
@@ -157,23 +162,27 @@ pub fn determinism(
     mut watch: impl FnMut(&State),
 ) -> Result<Determinism, ReplayError> {
     let scene = recording.scene().clone();
+    let same_revision = recording.bits() == crate::BITS;
     let bytes = match file {
-        Some(file) => {
+        Some(file) if same_revision => {
             let header = recording.header()?;
             bytes::Recording::begin(recording.format(), header, file).ok()
         }
-        None => None,
+        _ => None,
     };
     let ledger = Ledger::new(scene.channels.metrics, bytes);
     let mut verdict = Determinism {
         origin: match recording.from_step() {
-            _ if scene.starts_from_disks() => Origin::Scene,
+            _ if scene.starts_from_disks() && same_revision => Origin::Scene,
             0 => Origin::Positions,
             _ => Origin::Frame,
         },
         ..Determinism::default()
     };
     let (ledger, end) = match way {
+        _ if !same_revision => {
+            run_from_recorded(recording, &scene, ledger, &mut verdict, &mut watch)?
+        }
         Way::Whole => run_whole(recording, &scene, ledger, &mut verdict, &mut watch)?,
         Way::Segments(n) => {
             let threads = n.clamp(1, cores());
@@ -195,6 +204,7 @@ fn conclude(recording: &mut Recording, mut ledger: Ledger, end: End, verdict: &m
     let compared = ledger.end(closed);
     verdict.metrics = ledger.metrics();
     verdict.difference = ledger.difference().cloned();
+    verdict.deviation = ledger.deviation();
     let Some(compared) = compared.filter(|_| verdict.difference.is_none()) else {
         return;
     };
@@ -219,6 +229,9 @@ fn each_segment(
     let (mut last, mut goes_on) = (None, true);
     let mut next = recording.next_state()?;
     while let Some(state) = next.take() {
+        if last.is_none() {
+            recording.check_run(&state.frame)?;
+        }
         watch(&state);
         // Whether it is the last shows when there is none behind it.
         let behind = recording.next_state();
@@ -280,6 +293,40 @@ fn run_whole(
     if let Some(run) = &mut run {
         go_on_behind(recording, scene, end, run, &mut snapshots, &mut ledger)?;
         verdict.run = run.step() - began;
+    }
+    Ok((ledger, end))
+}
+
+/// A run a segment, each from what is recorded at its beginning: for another revision of the bits.
+fn run_from_recorded(
+    recording: &mut Recording,
+    scene: &Scene,
+    mut ledger: Ledger,
+    verdict: &mut Determinism,
+    watch: &mut impl FnMut(&State),
+) -> Result<(Ledger, End), ReplayError> {
+    let mut ran = 0;
+    let end = each_segment(recording, verdict, watch, |mut segment| {
+        ledger.allow(segment.allowed(scene));
+        ledger.find(core::mem::take(&mut segment.rows));
+        let mut run = segment.run_from_recorded(scene)?;
+        let mut snapshots = Snapshots::default();
+        let begin = run.step();
+        let found = segment.approach(&mut run, scene, &mut snapshots, |s| ledger.give(s))?;
+        ledger.differs(found);
+        let off = tolerance::deviation(&segment.packing, &segment.to, &run.frame());
+        ledger.deviates(off, segment.to.step);
+        ran += run.step() - begin;
+        Ok(ledger.difference().is_none())
+    })?;
+    verdict.run = ran;
+    if let Some(outcome) = end.outcome
+        && !outcome.converged
+        && outcome.steps < scene.steps
+    {
+        let f_max = outcome.f_max;
+        let (step, what) = (outcome.steps, What::GoesOn { f_max });
+        ledger.differs(Some(Difference { step, what }));
     }
     Ok((ledger, end))
 }

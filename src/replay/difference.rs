@@ -212,7 +212,10 @@ impl fmt::Display for Difference {
             What::Step(there) => write!(f, "step {there} there"),
             What::Row { name, row } => write!(f, "metric {name} {row}"),
             What::Ends { converged: true } => {
-                write!(f, "the run converges here, and the recording says otherwise")
+                write!(
+                    f,
+                    "the run converges here, and the recording says otherwise"
+                )
             }
             What::Ends { converged: false } => write!(
                 f,
@@ -224,7 +227,10 @@ impl fmt::Display for Difference {
             ),
             What::Converged { there } => {
                 let word = if *there { "has" } else { "has not" };
-                write!(f, "the run {word} converged here, and the result says otherwise")
+                write!(
+                    f,
+                    "the run {word} converged here, and the result says otherwise"
+                )
             }
             What::Steps { here } => write!(f, "the result names {here} steps"),
         }

@@ -1,8 +1,10 @@
 //! What the run gives, held against what the file holds: every row of the metrics once, and every byte.
 
+use super::Metrics;
+use super::balance::Worst;
 use super::bytes::{self, Compared};
 use super::difference::{Difference, Row, What};
-use super::Metrics;
+use super::tolerance;
 use crate::force::{self, METRICS};
 use crate::record::{Outcome, Snapshot};
 use crate::scene::Schedule;
@@ -29,6 +31,8 @@ pub(super) struct Ledger {
     metrics: u64,
     difference: Option<Difference>,
     bytes: Option<bytes::Recording>,
+    /// Of another revision of the bits: how far it is off at worst, and what is allowed at present.
+    deviation: Option<(Worst, f64)>,
 }
 
 impl Ledger {
@@ -42,7 +46,26 @@ impl Ledger {
             metrics: 0,
             difference: None,
             bytes,
+            deviation: None,
         }
+    }
+
+    /// From here on values may be off by `allowed`.
+    pub fn allow(&mut self, allowed: f64) {
+        let worst = self.deviation().unwrap_or_default();
+        self.deviation = Some((worst, allowed));
+    }
+
+    /// A state is off by so much.
+    pub fn deviates(&mut self, value: f64, step: u64) {
+        if let Some((worst, allowed)) = &mut self.deviation {
+            worst.of(value, *allowed, step);
+        }
+    }
+
+    /// The worst that another revision is off by.
+    pub fn deviation(&self) -> Option<Worst> {
+        self.deviation.map(|(worst, _)| worst)
     }
 
     /// The first difference so far.
@@ -58,7 +81,11 @@ impl Ledger {
     /// Notes a difference, if none is known that is earlier.
     pub fn differs(&mut self, difference: Option<Difference>) {
         let Some(new) = difference else { return };
-        if self.difference.as_ref().is_none_or(|old| new.step < old.step) {
+        if self
+            .difference
+            .as_ref()
+            .is_none_or(|old| new.step < old.step)
+        {
             self.difference = Some(new);
         }
     }
@@ -88,7 +115,11 @@ impl Ledger {
             None if self.schedule.includes(step) => self.row(step, k, Row::Twice),
             None => self.row(step, k, Row::NotAsked),
         }
-        if self.awaited.get(&step).is_some_and(|v| v.iter().all(Option::is_none)) {
+        if self
+            .awaited
+            .get(&step)
+            .is_some_and(|v| v.iter().all(Option::is_none))
+        {
             self.awaited.remove(&step);
         }
     }
@@ -158,12 +189,19 @@ impl Ledger {
     }
 
     fn row(&mut self, step: u64, k: usize, row: Row) {
-        let what = What::Row { name: METRICS[k], row };
+        let what = What::Row {
+            name: METRICS[k],
+            row,
+        };
         self.differs(Some(Difference { step, what }));
     }
 
     fn compare(&mut self, step: u64, k: usize, here: f64, there: f64) {
         self.metrics += 1;
+        if let Some((worst, allowed)) = &mut self.deviation {
+            tolerance::note_metric(worst, METRICS[k], here, there, *allowed, step);
+            return;
+        }
         if here.to_bits() != there.to_bits() {
             let name = format!("metric {}", METRICS[k]);
             let what = What::Value { name, here, there };

@@ -18,12 +18,14 @@ mod recording;
 mod rrd;
 mod source;
 mod steps;
+mod tolerance;
 mod walk;
 
 pub use balance::{Balance, Worst};
 pub use compare::{Comparison, compare};
 pub use determinism::{Bytes, Determinism, Origin, ReplayError, Way, determinism};
 pub use difference::{Difference, Row, What, ulps};
+pub use recording::place_of_byte;
 pub use recording::{Metrics, Recording, State};
 pub use source::reading_damaged_bytes;
 

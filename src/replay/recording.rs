@@ -10,6 +10,7 @@ use crate::budget::Budget;
 use crate::contact::solver::Method;
 use crate::crowding::{self, Crowd};
 use crate::domain::{Domain, Vec2};
+use crate::force::METRICS;
 use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
 use crate::record::{Format, Outcome, PROGRAM};
@@ -62,6 +63,23 @@ const WAITING_METRICS: u64 = 800;
 
 /// Unknowns of the largest dense system of equations that a recording may ask for: a minute each.
 const LARGEST_DENSE: usize = 10_000;
+
+/// What a byte of a recording belongs to, in words; `None` if nobody can tell.
+///
+/// ```
+/// assert_eq!(softjam::replay::place_of_byte("/nowhere/run.rrd", 100), None);
+/// ```
+#[must_use]
+pub fn place_of_byte(path: impl AsRef<Path>, at: u64) -> Option<String> {
+    let file = File::open(&path).ok()?;
+    let length = file.metadata().ok()?.len();
+    let source = Box::new(BufReader::new(file));
+    match Format::of(&path) {
+        Format::Rrd => rrd::place_of_byte(source, length, Budget::default(), at),
+        // Whatever was changed in an MCAP file shows in its checksums.
+        Format::Mcap => None,
+    }
+}
 
 /// Metrics by step: names and values.
 ///
@@ -246,7 +264,11 @@ impl Recording {
                 } => {
                     // Without states there is nobody to give them to.
                     if self.header.scene.channels.state.is_on() {
-                        self.metrics.entry(step).or_default().push((name, value));
+                        let row = self.metrics.entry(step).or_default();
+                        // Twice is enough to know that a row stands there more than once.
+                        if row.len() < 2 * METRICS.len() {
+                            row.push((name, value));
+                        }
                         self.allow_waiting_metrics()?;
                     }
                 }
@@ -409,6 +431,14 @@ impl Recording {
             closed: self.is_closed(),
             outcome: self.outcome,
         }
+    }
+
+    /// Whether the file claims to be laid out by softjam, and not by another program that rewrote it.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn is_laid_out_by_softjam(&self) -> bool {
+        self.source.is_of_softjam()
     }
 
     /// Whether the file does not claim to be as this version writes it: another program, or another version, wrote it.

@@ -1,7 +1,7 @@
 //! The run along a stretch of a recording: from one recorded state to the next.
 
-use super::difference::{self, Difference, What};
 use super::Metrics;
+use super::difference::{self, Difference, What};
 use crate::frame::Frame;
 use crate::packing::Packing;
 use crate::record::{Outcome, Snapshot, Snapshots};
@@ -47,6 +47,21 @@ impl Segment {
         run: &mut Relaxation,
         scene: &Scene,
         snapshots: &mut Snapshots,
+        emit: impl FnMut(Arc<Snapshot>) -> bool,
+    ) -> Result<Option<Difference>, RelaxError> {
+        let found = self.approach(run, scene, snapshots, emit)?;
+        let end = self.end.filter(|end| end.closed);
+        Ok(found
+            .or_else(|| Difference::between(&self.to, &run.frame()))
+            .or_else(|| end.and_then(|end| end.differs(run))))
+    }
+
+    /// [`walk`](Self::walk) without the comparison at its end.
+    pub fn approach(
+        &self,
+        run: &mut Relaxation,
+        scene: &Scene,
+        snapshots: &mut Snapshots,
         mut emit: impl FnMut(Arc<Snapshot>) -> bool,
     ) -> Result<Option<Difference>, RelaxError> {
         let (to, first) = (self.to.step, self.from.is_none());
@@ -65,15 +80,10 @@ impl Segment {
             }
         }
         let edge = first || self.is_last(run, scene.channels.state);
-        if let Some(snapshot) = snapshots.take(run, &scene.channels, edge)
-            && !emit(snapshot)
-        {
-            return Ok(None);
+        if let Some(snapshot) = snapshots.take(run, &scene.channels, edge) {
+            emit(snapshot);
         }
-        let frame = run.frame();
-        let end = self.end.filter(|end| end.closed);
-        let differs = Difference::between(&self.to, &frame);
-        Ok(differs.or_else(|| end.and_then(|end| end.differs(run))))
+        Ok(None)
     }
 
     /// Whether the run was ended at the segment's end: every channel that is on has recorded it.
@@ -97,9 +107,9 @@ impl End {
                 Some(What::Converged { there: converged })
             }
             (Some(end), true) if end.steps != step => Some(What::Steps { here: end.steps }),
-            (Some(end), true) => {
-                difference::numbers(&[end.f_max], &[run.f_max()], |_| "f_max of the result".into())
-            }
+            (Some(end), true) => difference::numbers(&[end.f_max], &[run.f_max()], |_| {
+                "f_max of the result".into()
+            }),
         };
         what.map(|what| Difference { step, what })
     }

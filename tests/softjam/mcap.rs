@@ -40,7 +40,8 @@ fn both_formats_hold_the_same_events_and_verify_the_same_way() {
     assert_eq!(sorted(&rrd), sorted(&mcap));
     for way in [Way::Whole, Way::Segments(2)] {
         let verdicts = [&rrd, &mcap].map(|bytes| {
-            determinism(&mut open(bytes).expect("a recording"), way, |_| {}).expect("a verdict")
+            determinism(&mut open(bytes).expect("a recording"), way, None, |_| {})
+                .expect("a verdict")
         });
         assert_eq!(verdicts[0].difference, None);
         assert_eq!(verdicts[0], verdicts[1]);
@@ -117,7 +118,7 @@ const PLAIN: &[u8] = include_bytes!("../../fuzz/corpus/recording/plain.mcap");
 #[test]
 fn a_file_that_another_writer_has_rewritten_verifies() {
     let mut recording = open(PLAIN).expect("a recording");
-    let verdict = determinism(&mut recording, Way::Whole, |_| {}).expect("a verdict");
+    let verdict = determinism(&mut recording, Way::Whole, None, |_| {}).expect("a verdict");
     assert_eq!((verdict.difference, verdict.steps), (None, Some((0, 3))));
     assert!(recording.is_closed());
     assert!(recording.outcome().is_some_and(|end| end.steps == 3));
@@ -441,7 +442,7 @@ fn a_run_that_goes_on_from_an_unscheduled_step_records_it_first() {
         let steps: Vec<u64> = states(&bytes).iter().map(|frame| frame.step).collect();
         assert_eq!(steps[..3], [33, 40, 60]);
         let mut recording = open(&bytes).expect("a recording");
-        let verdict = determinism(&mut recording, Way::Whole, |_| {}).expect("a verdict");
+        let verdict = determinism(&mut recording, Way::Whole, None, |_| {}).expect("a verdict");
         assert_eq!(verdict.difference, None);
     }
 }

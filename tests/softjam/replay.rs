@@ -30,7 +30,7 @@ pub fn record(scene: &Scene, change: impl FnMut(&mut Snapshot)) -> Vec<u8> {
 }
 
 pub fn replay(bytes: &[u8], way: Way) -> Result<Determinism, ReplayError> {
-    determinism(&mut open(bytes)?, way, |_| {})
+    determinism(&mut open(bytes)?, way, None, |_| {})
 }
 
 /// What is done to a snapshot on its way to the recorder.
@@ -244,7 +244,7 @@ fn forces_that_do_not_balance_are_told_from_positions_alone() {
             assert!((balance.forces.value / by - 1.0).abs() < 0.99);
         }
         if forgery.is_none_or(|(step, _)| step != last) {
-            assert!(balance.bears_out(&recording.outcome().expect("a result")));
+            assert!(balance.bears_out(&recording.outcome().expect("a result"), 0.0));
         }
     }
 }
@@ -412,7 +412,7 @@ fn golden_recordings_verify() {
         for way in WAYS {
             let mut recording = Recording::open(&path).expect(name);
             let mut balance = Balance::new(recording.scene());
-            let verdict = determinism(&mut recording, way, |state| {
+            let verdict = determinism(&mut recording, way, None, |state| {
                 let metrics = state.metrics.get(&state.frame.step);
                 balance.check(
                     &state.packing,
@@ -430,7 +430,7 @@ fn golden_recordings_verify() {
                 "{name}"
             );
             if let Some(end) = recording.outcome() {
-                assert!(balance.bears_out(&end), "{name}");
+                assert!(balance.bears_out(&end, 0.0), "{name}");
             }
         }
     }

@@ -11,6 +11,7 @@ use crate::force::METRICS;
 use crate::frame::Frame;
 use crate::record::Outcome;
 use crate::relax::fire::FireState;
+use crate::text::shown;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::Chunk;
 use rerun::{Scalars, TimelineName};
@@ -44,6 +45,34 @@ impl RrdSource {
             budget,
         };
         Ok((source, header))
+    }
+}
+
+/// What the byte `at` belongs to, in words.
+pub(super) fn place_of_byte(
+    source: Box<dyn Read + Send>,
+    length: u64,
+    budget: Budget,
+    at: u64,
+) -> Option<String> {
+    let mut stream = Stream::open(source, length, budget).ok()?;
+    loop {
+        let message = stream.next().ok()?;
+        if stream.offset() <= at && message.is_some() {
+            continue;
+        }
+        return Some(match message {
+            None => "its list of chunks".to_owned(),
+            Some(Message::Opens) => "where it opens".to_owned(),
+            Some(Message::Layout) => "its layout".to_owned(),
+            Some(Message::Chunk(_, chunk)) => {
+                let entity = shown(&chunk.entity_path().to_string());
+                match (steps(&chunk).min(), steps(&chunk).max()) {
+                    (Some(first), Some(last)) => format!("{entity}, steps {first} … {last}"),
+                    _ => entity,
+                }
+            }
+        });
     }
 }
 

@@ -13,7 +13,8 @@ use rerun::external::arrow::ipc::root_as_message;
 use rerun::external::re_log_encoding::ToApplication as _;
 use rerun::external::re_log_encoding::external::lz4_flex;
 use rerun::external::re_log_encoding::rrd::{
-    Compression as StreamCompression, Decodable as _, MessageHeader, MessageKind, StreamFooter, StreamHeader,
+    Compression as StreamCompression, Decodable as _, MessageHeader, MessageKind, StreamFooter,
+    StreamHeader,
 };
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::log::Chunk;
@@ -77,6 +78,11 @@ impl Stream {
     /// How the stream ended; `None` before its end.
     pub fn ending(&self) -> Option<Ending> {
         self.ending
+    }
+
+    /// Bytes read so far.
+    pub fn offset(&self) -> u64 {
+        self.offset
     }
 
     /// The next message; `None` at the end.

@@ -1,0 +1,83 @@
+//! What a replay that takes long says of itself, on standard error.
+
+use crate::cli::warn;
+use indicatif::{ProgressBar, ProgressStyle};
+use softjam::replay::Recording;
+use std::io::IsTerminal as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// A replay that is done sooner says nothing.
+const LONG: Duration = Duration::from_secs(3);
+
+/// Tells again after so long where nobody sees a line change.
+const AGAIN: Duration = Duration::from_secs(60);
+
+/// Shows the recorded step that the run is on its way to.
+pub(super) struct Progress {
+    towards: Arc<AtomicU64>,
+    /// Hanging up ends the thread.
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Progress {
+    pub fn of(recording: &Recording) -> Self {
+        let towards = Arc::new(AtomicU64::new(0));
+        let (end, ended) = channel();
+        let (seen, particles) = (Arc::clone(&towards), recording.radii().len());
+        let limit = recording.scene().steps;
+        let thread = std::thread::spawn(move || {
+            let start = Instant::now();
+            let bar = std::io::stderr()
+                .is_terminal()
+                .then(ProgressBar::new_spinner);
+            if let Some(bar) = &bar {
+                let style = ProgressStyle::with_template("{spinner} {msg}");
+                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+            }
+            let mut wait = LONG;
+            while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(wait) {
+                let text = format!(
+                    "running {particles} particles again, towards the recorded step {} (the scene's limit is {limit}); {} s so far, Ctrl-C ends it",
+                    seen.load(Ordering::Relaxed),
+                    start.elapsed().as_secs()
+                );
+                if let Some(bar) = &bar {
+                    bar.set_message(text);
+                    bar.tick();
+                    wait = Duration::from_millis(200);
+                } else {
+                    warn(&text);
+                    wait = AGAIN;
+                }
+            }
+            if let Some(bar) = bar {
+                bar.finish_and_clear();
+            }
+        });
+        Self {
+            towards,
+            end: Some(end),
+            thread: Some(thread),
+        }
+    }
+
+    /// The run goes on towards this step.
+    pub fn towards(&self, step: u64) {
+        self.towards.store(step, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.end = None;
+        if let Some(thread) = self.thread.take() {
+            // It only shows.
+            drop(thread.join());
+        }
+    }
+}
