@@ -140,7 +140,10 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
     let l = recording.domain().lengths();
     let scene = recording.scene();
     lines.line("file", path.to_owned());
-    lines.line("recorded by", recording.program().to_owned());
+    lines.line(
+        "recorded by",
+        format!("{} (bits {})", recording.program(), recording.bits()),
+    );
     lines.line("result", state_of(found, closed));
     lines.line(
         "packing",
@@ -210,6 +213,7 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
         .collect();
     let value = serde_json::json!({
         "program": recording.program(),
+        "bits": recording.bits(),
         "particles": recording.radii().len(),
         "phi": recording.coverage(),
         "box": [l.x, l.y],

@@ -16,13 +16,15 @@ mod replay;
 mod scene;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use softjam::BITS;
 use softjam::convert::ConvertError;
 use softjam::figure::FigureError;
-use softjam::record::RecordError;
+use softjam::record::{FORMAT_VERSION, RecordError};
 use softjam::relax::RelaxError;
 use softjam::scene::SceneError;
 use std::io::Write as _;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -33,10 +35,17 @@ Exit codes:
 
 /// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
 #[derive(Parser)]
-#[command(version, about, long_about = None, after_help = EXIT_CODES, propagate_version = true)]
+#[command(version = version(), about, long_about = None, after_help = EXIT_CODES, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
+}
+
+/// Name, version, and what a recording says of its own: the revision of the bits and the layout.
+fn version() -> &'static str {
+    let version = env!("CARGO_PKG_VERSION");
+    static TEXT: OnceLock<String> = OnceLock::new();
+    TEXT.get_or_init(|| format!("{version} (bits {BITS}, recording format {FORMAT_VERSION})"))
 }
 
 #[derive(Subcommand)]
