@@ -22,6 +22,8 @@ mod figures;
 #[cfg(feature = "recording")]
 mod files;
 #[cfg(feature = "recording")]
+mod hostile;
+#[cfg(feature = "recording")]
 mod mcap;
 mod physics;
 #[cfg(feature = "cli")]

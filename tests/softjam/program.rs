@@ -4,6 +4,7 @@ mod convert;
 mod help;
 mod live;
 mod replay;
+mod strangers;
 
 use crate::common::Folder;
 use std::fmt::Write as _;
