@@ -193,11 +193,19 @@ pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
 /// Units of the longest side of a PNG.
 const LONGEST_SIDE: f32 = 20_000.0;
 
-/// Refuses a figure whose shapes have places or sizes that are no numbers: forces or lengths beyond what a number can hold. Text is no
-/// place.
+/// Refuses a figure with places or sizes that are no numbers, or with such a force in its caption: forces or lengths beyond what a number
+/// can hold.
 fn check_numbers(svg: &str) -> Result<(), FigureError> {
-    let mut tags = svg.split('<').map(|part| part.split('>').next());
-    if tags.any(|tag| tag.is_some_and(|tag| tag.contains("NaN") || tag.contains("inf"))) {
+    let none = |text: &str, around: [&str; 2]| {
+        let [before, behind] = around;
+        ["NaN", "inf"]
+            .iter()
+            .any(|word| text.contains(&[before, word, behind].concat()))
+    };
+    let mut parts = svg
+        .split('<')
+        .map(|part| part.split_once('>').unwrap_or((part, "")));
+    if parts.any(|(tag, text)| none(tag, ["", ""]) || none(text, [" = ", " γ"])) {
         let problem = "forces or lengths are beyond what a number can hold".to_owned();
         return Err(FigureError::Draw(problem));
     }

@@ -24,6 +24,9 @@ mod files;
 #[cfg(feature = "recording")]
 mod forgery;
 #[cfg(feature = "recording")]
+mod hostile;
+
+#[cfg(feature = "recording")]
 mod mcap;
 mod physics;
 #[cfg(feature = "cli")]

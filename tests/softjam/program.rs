@@ -6,6 +6,7 @@ mod files;
 mod help;
 mod live;
 mod replay;
+mod strangers;
 
 use crate::common::Folder;
 use std::fmt::Write as _;
