@@ -25,12 +25,28 @@ pub struct Budget {
 ///
 /// See the example of the [module](self).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what} takes about {}, more than {of_what} {} of --memory", Size(*.bytes), Size(*.most))]
+#[error("{what} takes about {}, more than {} of --memory", Size(*.bytes), .share.of(*.most))]
 pub struct Exceeded {
     what: String,
     bytes: u64,
-    of_what: &'static str,
+    share: Share,
     most: u64,
+}
+
+/// How much of the budget may be asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Share {
+    All,
+    Eighth,
+}
+
+impl Share {
+    fn of(self, most: u64) -> String {
+        match self {
+            Self::All => format!("the {}", Size(most)),
+            Self::Eighth => format!("an eighth, {},", Size(most)),
+        }
+    }
 }
 
 /// A piece of a file lies in memory several times while it is read: packed, unpacked, and as what it says.
@@ -82,7 +98,7 @@ impl Budget {
     ///
     /// See the example of the [module](self).
     pub fn allow(self, what: impl fmt::Display, bytes: u64) -> Result<(), Exceeded> {
-        self.within(what, bytes, "the", self.bytes)
+        within(what, bytes, Share::All, self.bytes)
     }
 
     /// Whether `what`, a piece of a file, may have so many bytes.
@@ -96,26 +112,20 @@ impl Budget {
     /// assert_eq!(error.to_string(), "a chunk takes about 1.0 TiB, more than an eighth, 512.0 MiB, of --memory");
     /// ```
     pub fn allow_piece(self, what: impl fmt::Display, bytes: u64) -> Result<(), Exceeded> {
-        self.within(what, bytes, "an eighth,", self.piece())
+        within(what, bytes, Share::Eighth, self.piece())
     }
+}
 
-    fn within(
-        self,
-        what: impl fmt::Display,
-        bytes: u64,
-        of_what: &'static str,
-        most: u64,
-    ) -> Result<(), Exceeded> {
-        if bytes <= most {
-            return Ok(());
-        }
-        Err(Exceeded {
-            what: what.to_string(),
-            bytes,
-            of_what,
-            most,
-        })
+fn within(what: impl fmt::Display, bytes: u64, share: Share, most: u64) -> Result<(), Exceeded> {
+    if bytes <= most {
+        return Ok(());
     }
+    Err(Exceeded {
+        what: what.to_string(),
+        bytes,
+        share,
+        most,
+    })
 }
 
 impl FromStr for Budget {

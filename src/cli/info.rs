@@ -170,7 +170,9 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         );
     }
     if !found.channels.contains_key("state") {
-        let none = if scene.channels.state.is_on() {
+        let none = if scene.channels.state.is_on() && closed {
+            "none, though the scene asks for them"
+        } else if scene.channels.state.is_on() {
             "none: the file breaks off before the first"
         } else {
             "none: the recording can be looked at, not replayed"

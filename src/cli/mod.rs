@@ -43,8 +43,8 @@ struct Cli {
 
 /// Name, version, and what a recording says of its own: the revision of the bits and the layout.
 fn version() -> &'static str {
-    let version = env!("CARGO_PKG_VERSION");
     static TEXT: OnceLock<String> = OnceLock::new();
+    let version = env!("CARGO_PKG_VERSION");
     TEXT.get_or_init(|| format!("{version} (bits {BITS}, recording format {FORMAT_VERSION})"))
 }
 

@@ -3,6 +3,7 @@
 //! What the run gives goes through the recorder of the file's format again, on a thread of its own, into a sink that compares
 //! instead of writing. Pictures, colours, layout and names are then under proof as well as numbers.
 
+use super::walk::End;
 use crate::record::{Format, Header, McapRecorder, Outcome, Recorder, RrdRecorder, Snapshot};
 use std::io::{self, Read, Write};
 use std::sync::Arc;
@@ -84,11 +85,11 @@ impl Recording {
         drop(self.queue.send(Message::Snapshots(held)));
     }
 
-    /// The verdict on a file that was closed by its writer, with the outcome that the run has, or that breaks off.
-    pub fn end(mut self, closed: Option<Option<Outcome>>) -> Compared {
+    /// The verdict on a file that ends so.
+    pub fn end(mut self, end: End) -> Compared {
         self.hand_over();
-        if let Some(outcome) = closed {
-            drop(self.queue.send(Message::Finish(outcome)));
+        if end.closed {
+            drop(self.queue.send(Message::Finish(end.outcome)));
         }
         drop(self.queue);
         self.thread

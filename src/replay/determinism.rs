@@ -200,8 +200,7 @@ fn cores() -> usize {
 /// The end of the file against the end of the run.
 fn conclude(recording: &mut Recording, mut ledger: Ledger, end: End, verdict: &mut Determinism) {
     ledger.find(recording.rows_left());
-    let closed = end.closed.then_some(end.outcome);
-    let compared = ledger.end(closed);
+    let compared = ledger.end(end);
     verdict.metrics = ledger.metrics();
     verdict.difference = ledger.difference().cloned();
     verdict.deviation = ledger.deviation();

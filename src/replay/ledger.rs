@@ -5,8 +5,9 @@ use super::balance::Worst;
 use super::bytes::{self, Compared};
 use super::difference::{Difference, Row, What};
 use super::tolerance;
+use super::walk::End;
 use crate::force::{self, METRICS};
-use crate::record::{Outcome, Snapshot};
+use crate::record::Snapshot;
 use crate::scene::Schedule;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -170,14 +171,14 @@ impl Ledger {
         until
     }
 
-    /// The end of both: nothing may be left. `closed` has the outcome that is recorded in a file that was closed by its writer.
-    pub fn end(&mut self, closed: Option<Option<Outcome>>) -> Option<Compared> {
+    /// The end of both: nothing may be left.
+    pub fn end(&mut self, end: End) -> Option<Compared> {
         self.miss();
         if let Some((&step, values)) = self.found.first_key_value() {
             let k = values.iter().position(Option::is_some).unwrap_or(0);
             self.row(step, k, Row::BehindTheEnd);
         }
-        self.bytes.take().map(|bytes| bytes.end(closed))
+        self.bytes.take().map(|bytes| bytes.end(end))
     }
 
     /// The first row that is awaited is missing.

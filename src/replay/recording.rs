@@ -476,7 +476,7 @@ impl Recording {
             return Ok(());
         }
         let name = format_args!("its contact_solver \"gauss-jordan\" with {unknowns} unknowns");
-        self.allow(&name, 8 * (unknowns as u64).saturating_pow(2))?;
+        self.allow(name, 8 * (unknowns as u64).saturating_pow(2))?;
         if unknowns <= LARGEST_DENSE {
             return Ok(());
         }

@@ -177,7 +177,7 @@ fn lengths_that_a_file_only_claims_are_not_believed() {
             }
         };
         assert!(
-            ["claims to hold", "breaks off", "has no radii"]
+            ["more than an eighth", "breaks off", "has no radii"]
                 .iter()
                 .any(|part| text.contains(part)),
             "{text}"

@@ -6,7 +6,7 @@ use softjam::record::{Format, Snapshot};
 use softjam::relax::Relaxation;
 use softjam::relax::newton::Turns;
 use softjam::replay::{
-    Balance, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
+    Balance, Bytes, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
 };
 use softjam::scene::{Channels, Minimizer, Radii, Scene, Schedule, Species};
 
@@ -435,4 +435,24 @@ fn golden_recordings_verify() {
         }
     }
     assert!(size < 8 << 20, "{size} bytes of golden recordings");
+}
+
+#[test]
+fn recordings_of_version_0_1_are_verified_by_what_they_hold() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/version-0.1");
+    for name in ["jammed.rrd", "jammed.mcap", "state-only.rrd"] {
+        for way in WAYS {
+            let path = folder.join(name);
+            let mut recording = Recording::open(&path).expect(name);
+            assert_eq!(
+                (recording.program(), recording.bits()),
+                ("softjam 0.1.0", 1)
+            );
+            let file = std::fs::File::open(&path).expect(name);
+            let verdict = determinism(&mut recording, way, Some(Box::new(file)), |_| {});
+            let verdict = verdict.expect(name);
+            assert_eq!(verdict.difference, None, "{name}");
+            assert_eq!(verdict.bytes, Bytes::LaidOutOtherwise, "{name}");
+        }
+    }
 }

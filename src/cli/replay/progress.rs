@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 const LONG: Duration = Duration::from_secs(3);
 
 /// Tells again after so long where nobody sees a line change.
-const AGAIN: Duration = Duration::from_secs(60);
+const AGAIN: Duration = Duration::from_mins(1);
 
 /// Shows the recorded step that the run is on its way to.
 pub(super) struct Progress {

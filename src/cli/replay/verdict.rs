@@ -223,7 +223,7 @@ impl Findings {
         match d.origin {
             Origin::Scene => {}
             Origin::Positions => {
-                not.push("whether the start file holds these positions and radii".to_owned())
+                not.push("whether the start file holds these positions and radii".to_owned());
             }
             Origin::Frame => not.push(format!(
                 "how the run came to step {}, which is in the recording that this one goes on from",
@@ -233,7 +233,7 @@ impl Findings {
         let pictures = "pictures, layout and names";
         match d.bytes {
             _ if d.difference.is_some() => {
-                not.push(format!("what comes behind the difference; {pictures}"))
+                not.push(format!("what comes behind the difference; {pictures}"));
             }
             Bytes::Same(bytes) => checked.push(format!(
                 "all {bytes} bytes of the file, {pictures} with them"
@@ -272,7 +272,7 @@ impl Findings {
                     ),
                 );
             }
-            lines.line("determinism", self.tell_difference(d));
+            lines.line("determinism", tell_difference(d));
             if let Some(bytes) = tell_bytes(d, path) {
                 lines.line("bytes", bytes);
             }
@@ -295,36 +295,6 @@ impl Findings {
         lines.line("verdict", self.verdict());
         lines.say("checked", &self.checked());
         lines.into_text()
-    }
-
-    fn tell_difference(&self, d: &Determinism) -> String {
-        let (first, last) = d.steps.unwrap_or_default();
-        if let Some(difference) = &d.difference {
-            return format!("differs: {difference} (here: the file)");
-        }
-        if nothing_was_run(d) {
-            return "nothing was run: the only recorded state is where the recording begins"
-                .to_owned();
-        }
-        let what = format!(
-            "{} and {}, steps {first} … {last}",
-            count(d.states, "state"),
-            count(d.metrics, "metric")
-        );
-        match d.deviation {
-            None => format!("{what}: the same to the last bit"),
-            Some(worst) => {
-                let word = if worst.agrees() {
-                    "agrees"
-                } else {
-                    "does not agree"
-                };
-                format!(
-                    "{what}: {word} to {:.1e} at step {} (allowed there: {:.1e}), other revision of the bits",
-                    worst.value, worst.step, worst.allowed
-                )
-            }
-        }
     }
 
     pub fn json(&self, path: &Path) -> String {
@@ -390,6 +360,35 @@ fn nothing_was_run(d: &Determinism) -> bool {
 fn count(n: u64, thing: &str) -> String {
     let s = if n == 1 { "" } else { "s" };
     format!("{n} {thing}{s}")
+}
+
+fn tell_difference(d: &Determinism) -> String {
+    let (first, last) = d.steps.unwrap_or_default();
+    if let Some(difference) = &d.difference {
+        return format!("differs: {difference} (here: the file)");
+    }
+    if nothing_was_run(d) {
+        return "nothing was run: the only recorded state is where the recording begins".to_owned();
+    }
+    let what = format!(
+        "{} and {}, steps {first} … {last}",
+        count(d.states, "state"),
+        count(d.metrics, "metric")
+    );
+    match d.deviation {
+        None => format!("{what}: the same to the last bit"),
+        Some(worst) => {
+            let word = if worst.agrees() {
+                "agrees"
+            } else {
+                "does not agree"
+            };
+            format!(
+                "{what}: {word} to {:.1e} at step {} (allowed there: {:.1e}), other revision of the bits",
+                worst.value, worst.step, worst.allowed
+            )
+        }
+    }
 }
 
 fn tell_bytes(d: &Determinism, path: &Path) -> Option<String> {

@@ -128,6 +128,14 @@ impl McapSource {
                     let read = particles(message.radius, Some(message.sides));
                     packing = Some(read.map_err(missing)?);
                 }
+                Some(Record::Message { header, .. })
+                    if [topic::STATE, topic::METRICS].contains(&topics.of(&header)) =>
+                {
+                    let topic = topics.of(&header);
+                    return Err(not_mcap(format!(
+                        "messages of {topic} stand in front of its scene and radii"
+                    )));
+                }
                 Some(_) => {}
                 None => {
                     return Err(missing(match (about, toml) {
@@ -184,6 +192,9 @@ impl Source for McapSource {
                 let at = |problem: String| format!("{topic} at step {step}: {problem}");
                 match topic {
                     topic::STATE => items.push(read_state(&data).map_err(at)?),
+                    topic::PARTICLES => {
+                        return Err("it has two records of its particles".to_owned().into());
+                    }
                     topic::METRICS => read_metrics(&data, items).map_err(at)?,
                     topic::CONTOURS => items.push(Item::Drawn {
                         channel: "contours",

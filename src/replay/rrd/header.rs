@@ -71,6 +71,14 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
                 };
                 return Ok((store, header));
             }
+            entity
+                if entity == "/state" || entity == "/result" || entity.starts_with("/metrics/") =>
+            {
+                return Err(damaged(format!(
+                    "rows of {} stand in front of its scene and radii",
+                    shown(entity)
+                )));
+            }
             _ => {}
         }
     }

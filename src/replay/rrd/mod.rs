@@ -119,6 +119,15 @@ fn take_apart(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
     let entity = chunk.entity_path().to_string();
     match entity.as_str() {
         "/state" => read_states(chunk, items)?,
+        // The header has been read: what else is of it is there twice.
+        "/particles" => return Err("it has two records of its particles".to_owned()),
+        "/scene"
+            if chunk
+                .components()
+                .contains_component("softjam.Scene:toml".into()) =>
+        {
+            return Err("it has two scenes".to_owned());
+        }
         "/result" => items.push(read_result(chunk).ok_or("its result is not whole")?),
         "/world/contours" | "/world/contacts" if !chunk.is_static() => {
             let channel = if entity == "/world/contours" {
