@@ -494,7 +494,7 @@ impl Recording {
         let allowed = self.budget.allow(what, bytes);
         allowed.map_err(|exceeded| ReadError::Budget {
             path: self.path.clone(),
-            problem: format!("{exceeded}; `softjam replay --only balance` does without a run"),
+            problem: exceeded.to_string(),
         })
     }
 

@@ -214,7 +214,7 @@ const STATE: [(&str, Forge); 4] = [
 /// What is forged of the result.
 const RESULT: [(&str, Forge); 4] = [
     ("converged", |run, _| {
-        result(run, |end| end.converged = false)
+        result(run, |end| end.converged = false);
     }),
     ("steps", |run, _| result(run, |end| end.steps += 1)),
     ("f_max", |run, _| {

@@ -241,7 +241,7 @@ fn dense_systems_too_large_to_solve_are_not_run() {
         ..Scene::default()
     };
     let dense = |header: &mut Header| {
-        header.scene.contact_solver = softjam::contact::solver::Method::GaussJordan
+        header.scene.contact_solver = softjam::contact::solver::Method::GaussJordan;
     };
     let bytes = forged(Format::Rrd, &scene, dense, |_| {});
     let mut recording = open(&bytes).expect("a header");

@@ -112,7 +112,8 @@ fn every_verb_that_reads_keeps_to_the_memory_it_is_given() {
             let (code, _, errors) = run(path, &little);
             assert_eq!(code, Some(1), "{little:?}: {errors}");
             assert!(
-                errors.contains("8.0 KiB, of --memory"),
+                errors.contains("8.0 KiB, of --memory")
+                    || errors.contains("the 64.0 KiB of --memory"),
                 "{little:?}: {errors}"
             );
             let enough = [verb, &["--memory", "1G"]].concat();
