@@ -19,6 +19,7 @@ mod rrd;
 mod source;
 mod steps;
 mod tolerance;
+mod turns;
 mod walk;
 
 pub use balance::{Balance, Worst};

@@ -1,5 +1,7 @@
 //! A recording, read event by event.
 
+mod limits;
+
 use super::mcap::McapSource;
 use super::rrd::RrdSource;
 use super::source::{Ending, Header, Item, Problem, Source};
@@ -7,7 +9,6 @@ use super::steps::Steps;
 use super::walk::End;
 use super::{Event, ReadError, mcap, rrd};
 use crate::budget::Budget;
-use crate::contact::solver::Method;
 use crate::crowding::{self, Crowd};
 use crate::domain::{Domain, Vec2};
 use crate::force::METRICS;
@@ -57,12 +58,6 @@ pub struct Recording {
     metrics: Metrics,
     budget: Budget,
 }
-
-/// Bytes that the metrics of a step take while they wait for a state.
-const WAITING_METRICS: u64 = 800;
-
-/// Unknowns of the largest dense system of equations that a recording may ask for: a minute each.
-const LARGEST_DENSE: usize = 10_000;
 
 /// What a byte of a recording belongs to, in words; `None` if nobody can tell.
 ///
@@ -335,9 +330,7 @@ impl Recording {
     /// See the example of [`Recording`].
     pub fn header(&self) -> Result<crate::record::Header, ReadError> {
         // Radii and box are all that a header has of a packing.
-        let anywhere = vec![Vec2::zeros(); self.header.radii.len()];
-        let packing = Packing::new(self.header.domain, self.header.radii.clone(), anywhere)
-            .map_err(|error| self.damaged(error.to_string()))?;
+        let packing = self.packing_anywhere(vec![Vec2::zeros(); self.header.radii.len()])?;
         Ok(crate::record::Header {
             scene: self.header.scene.clone(),
             packing,
@@ -387,39 +380,6 @@ impl Recording {
         self.steps.last
     }
 
-    /// The packing at a recorded frame.
-    ///
-    /// # Errors
-    ///
-    /// [`ReadError::Damaged`] if the frame is not one of this recording, [`ReadError::Crowded`] if particles lie on each other as
-    /// in no packing.
-    ///
-    /// See the example of [`Recording`].
-    pub fn packing(&self, frame: &Frame) -> Result<Packing, ReadError> {
-        self.packing_and_overlaps(frame).map(|(packing, _)| packing)
-    }
-
-    /// The packing at a frame, and the number of pairs of its disks that overlap.
-    fn packing_and_overlaps(&self, frame: &Frame) -> Result<(Packing, usize), ReadError> {
-        let packing = self.packing_anywhere(frame.positions.clone())?;
-        match crowding::pairs(&packing) {
-            Ok(overlaps) => Ok((packing, overlaps)),
-            Err(Crowd { particle, others }) => Err(ReadError::Crowded {
-                path: self.path.clone(),
-                step: frame.step,
-                particle,
-                others,
-            }),
-        }
-    }
-
-    /// The particles at any positions.
-    pub(crate) fn packing_anywhere(&self, positions: Vec<Vec2>) -> Result<Packing, ReadError> {
-        let radii = self.header.radii.clone();
-        Packing::new(self.header.domain, radii, positions)
-            .map_err(|error| self.damaged(error.to_string()))
-    }
-
     /// The rows of the metrics that no state has taken along.
     pub(super) fn rows_left(&mut self) -> Metrics {
         core::mem::take(&mut self.metrics)
@@ -444,68 +404,6 @@ impl Recording {
     /// Whether the file does not claim to be as this version writes it: another program, or another version, wrote it.
     pub(super) fn is_laid_out_otherwise(&self) -> bool {
         !self.source.is_of_softjam() || self.header.program != PROGRAM
-    }
-
-    /// Whether the scene can be run from `frame` on within the budget: to be asked before it is.
-    ///
-    /// # Errors
-    ///
-    /// [`ReadError::Budget`] names what takes too much and the way out.
-    ///
-    /// ```
-    /// use softjam::replay::Recording;
-    /// # use softjam::{record, relax::Relaxation, scene::Scene};
-    /// # let path = std::env::temp_dir().join("softjam-check-run-example.rrd");
-    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
-    /// # let mut run = Relaxation::new(&scene).unwrap();
-    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-    /// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
-    ///
-    /// let mut recording = Recording::open(&path).unwrap();
-    /// let first = recording.next_state().unwrap().unwrap();
-    /// assert!(recording.check_run(&first.frame).is_ok());
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
-    pub fn check_run(&self, frame: &Frame) -> Result<(), ReadError> {
-        let (_, overlaps) = self.packing_and_overlaps(frame)?;
-        let (scene, particles) = (self.scene(), self.header.radii.len());
-        let name = format_args!("a run of its scene with {particles} particles");
-        self.allow(name, scene.memory_estimate(particles))?;
-        let unknowns = overlaps.max(frame.contacts.len());
-        if scene.contact_solver != Method::GaussJordan {
-            return Ok(());
-        }
-        let name = format_args!("its contact_solver \"gauss-jordan\" with {unknowns} unknowns");
-        self.allow(name, 8 * (unknowns as u64).saturating_pow(2))?;
-        if unknowns <= LARGEST_DENSE {
-            return Ok(());
-        }
-        Err(ReadError::Budget {
-            path: self.path.clone(),
-            problem: format!(
-                "{name} takes longer than anyone waits, more than {LARGEST_DENSE} are not run; `softjam replay --only balance` \
-                 does without a run"
-            ),
-        })
-    }
-
-    /// Refuses what takes more memory than there may be.
-    pub(crate) fn allow(&self, what: impl core::fmt::Display, bytes: u64) -> Result<(), ReadError> {
-        let allowed = self.budget.allow(what, bytes);
-        allowed.map_err(|exceeded| ReadError::Budget {
-            path: self.path.clone(),
-            problem: exceeded.to_string(),
-        })
-    }
-
-    fn allow_waiting_metrics(&self) -> Result<(), ReadError> {
-        let steps = self.metrics.len() as u64;
-        let name = format_args!("the metrics of {steps} steps between two states");
-        let allowed = self.budget.allow_piece(name, WAITING_METRICS * steps);
-        allowed.map_err(|exceeded| ReadError::Budget {
-            path: self.path.clone(),
-            problem: exceeded.to_string(),
-        })
     }
 
     /// How the run ended, as far as it has been read.
