@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
     let header = convert::header(&recording, channels)?;
-    let writer = Writer::start(output.format, output.begin(arguments.force)?, header)?;
+    let writer = Writer::start_conversion(output.format, output.begin(arguments.force)?, header)?;
     let converted = convert::convert(&mut recording, writer, &channels);
     let without_states = !recording.scene().channels.state.is_on();
     let converted = converted.map_err(|error| match error {

@@ -150,6 +150,31 @@ impl Writer {
     /// # std::fs::remove_file(&path).unwrap();
     /// ```
     pub fn start(format: Format, file: NewFile, header: Header) -> Result<Self, RecordError> {
+        Self::begin(format, file, header, QUEUE_BYTES)
+    }
+
+    /// [`start`](Self::start) for snapshots that are read from another file: that can wait, so little waits here.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Create`].
+    ///
+    /// See the example of [`start`](Self::start).
+    pub fn start_conversion(
+        format: Format,
+        file: NewFile,
+        header: Header,
+    ) -> Result<Self, RecordError> {
+        Self::begin(format, file, header, QUEUE_BYTES / 4)
+    }
+
+    /// A writer for which so many bytes of snapshots may wait.
+    fn begin(
+        format: Format,
+        file: NewFile,
+        header: Header,
+        waiting: usize,
+    ) -> Result<Self, RecordError> {
         let name = file.path().display().to_string();
         let fails = |source| RecordError::Create {
             path: name.clone(),
@@ -164,7 +189,7 @@ impl Writer {
         // What a frame holds of each particle, with 2.5 contacts.
         let frame = 72 * header.packing.len();
         let room = match format {
-            Format::Rrd => QUEUE.max(QUEUE_BYTES / frame.max(TOGETHER_BYTES)),
+            Format::Rrd => QUEUE.max(waiting / frame.max(TOGETHER_BYTES)),
             Format::Mcap => QUEUE,
         };
         let (queue, messages) = sync_channel(room);
