@@ -215,7 +215,14 @@ impl Findings {
             count(d.metrics, "metric")
         );
         checked.push(match d.deviation {
-            None => format!("{begin}, {steps}: {rows}, by their bits, and where the run ends"),
+            None => {
+                let end = if self.result.is_some() {
+                    ", and where the run ends"
+                } else {
+                    ""
+                };
+                format!("{begin}, {steps}: {rows}, by their bits{end}")
+            }
             Some(_) => {
                 format!("{steps} from recorded state to recorded state, within tolerances: {rows}")
             }
