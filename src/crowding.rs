@@ -5,6 +5,7 @@
 
 use crate::domain::{Domain, Vec2};
 use crate::packing::Packing;
+use core::ops::Range;
 use std::collections::BTreeMap;
 
 /// Particles no smaller than itself that a particle may overlap or touch. Centres strewn at random at φ = 1.3 come to about 5 on
@@ -145,22 +146,25 @@ impl Grid {
     /// particle. Ends when there are more than `enough`.
     fn around(&self, domain: Domain, seat: &Seat, enough: usize) -> (usize, usize) {
         let (column, row) = self.place(seat.at);
+        let one = |holds: bool| usize::from(holds);
         let (mut no_smaller, mut counted) = (0, 0);
-        for row in neighbors(row, self.rows) {
-            for column in neighbors(column, self.columns) {
-                let cell = row * self.columns + column;
-                let others = self.first[cell] as usize..self.first[cell + 1] as usize;
+        for row in beside(row, self.rows).into_iter().flatten() {
+            for columns in beside(column, self.columns) {
+                let cells = row * self.columns + columns.start..row * self.columns + columns.end;
+                let others = self.first[cells.start] as usize..self.first[cells.end] as usize;
+                // Without a branch: nobody could guess who is near.
                 for other in &self.seats[others] {
                     let sum = seat.radius + other.radius;
                     let near = domain.minimum_image(seat.at - other.at).norm_squared() < sum * sum;
-                    if near && other.radius >= seat.radius && other.particle != seat.particle {
-                        no_smaller += 1;
-                        let first = seat.particle < other.particle;
-                        counted += usize::from(other.radius > seat.radius || first);
-                        if no_smaller > enough {
-                            return (no_smaller, counted);
-                        }
-                    }
+                    let another = one(near) & one(other.particle != seat.particle);
+                    let larger = one(other.radius > seat.radius);
+                    let equal = one(other.radius == seat.radius);
+                    let first = one(seat.particle < other.particle);
+                    no_smaller += another & (larger | equal);
+                    counted += another & (larger | equal & first);
+                }
+                if no_smaller > enough {
+                    return (no_smaller, counted);
                 }
             }
         }
@@ -168,9 +172,14 @@ impl Grid {
     }
 }
 
-/// The number of a cell and of those beside it along a periodic line, each once.
-fn neighbors(place: usize, cells: usize) -> impl Iterator<Item = usize> {
-    (0..cells.min(3)).map(move |k| (place + cells + k - usize::from(cells > 1)) % cells)
+/// A cell and those beside it along a periodic line, each once: one stretch, or two where the line closes.
+fn beside(place: usize, cells: usize) -> [Range<usize>; 2] {
+    match place {
+        _ if cells <= 3 => [0..cells, 0..0],
+        0 => [0..2, cells - 1..cells],
+        last if last + 1 == cells => [last - 1..cells, 0..1],
+        _ => [place - 1..place + 2, 0..0],
+    }
 }
 
 #[cfg(test)]

@@ -180,7 +180,7 @@ impl Scene {
         let n = particles as u64;
         let dense = if self.contact_solver == Method::GaussJordan {
             // The dense matrix of some 2.5 N contacts.
-            50 * n * n
+            n.saturating_mul(50).saturating_mul(n)
         } else {
             0
         };
@@ -192,7 +192,8 @@ impl Scene {
             0
         };
         let each = 4_000 + 4_000 * u64::from(frames) + 24 * 4 * vertices + newton;
-        n * each + dense + UNDER_WAY.min(100_000 * n)
+        let dense = dense.saturating_add(UNDER_WAY.min(n.saturating_mul(100_000)));
+        n.saturating_mul(each).saturating_add(dense)
     }
 }
 

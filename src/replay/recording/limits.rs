@@ -77,7 +77,7 @@ impl Recording {
             return Ok(());
         }
         let name = format_args!("its contact_solver \"gauss-jordan\" with {unknowns} unknowns");
-        self.allow(name, 8 * (unknowns as u64).saturating_pow(2))?;
+        self.allow(name, (unknowns as u64).saturating_pow(2).saturating_mul(8))?;
         if unknowns <= LARGEST_DENSE {
             return Ok(());
         }
