@@ -16,6 +16,7 @@ use super::{ReadError, Recording, State};
 use crate::record::Snapshots;
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::Scene;
+use crate::text::shown;
 use std::io::Read;
 
 /// How the trajectory is run again.
@@ -115,7 +116,8 @@ pub enum ReplayError {
     Run(#[from] RelaxError),
     /// There is nothing to compare.
     #[error(
-        "{path} holds no state{}: it can be looked at, not replayed",
+        "{} holds no state{}: it can be looked at, not replayed",
+        shown(path),
         if *closed { "" } else { " before it breaks off" }
     )]
     NoState {

@@ -64,7 +64,13 @@ pub(super) fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
             progress.towards(state.frame.step);
             if wanted(Question::Balance) {
                 // The judge hangs up only by panicking, which is passed on below.
-                let _ = queue.send(state.clone());
+                let step = state.frame.step;
+                let metrics = state.metrics.get_key_value(&step).into_iter();
+                let _ = queue.send(State {
+                    frame: state.frame.clone(),
+                    packing: state.packing.clone(),
+                    metrics: metrics.map(|(step, row)| (*step, row.clone())).collect(),
+                });
             }
         };
         let found = if wanted(Question::Determinism) {
@@ -92,7 +98,7 @@ pub(super) fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
     let states = balance.as_ref().map_or(0, |b| b.frames) + found.as_ref().map_or(0, |d| d.states);
     if states == 0 {
         return Err(ReplayError::NoState {
-            path: shown(&arguments.file.display().to_string()),
+            path: arguments.file.display().to_string(),
             closed: recording.is_closed(),
         });
     }
