@@ -259,7 +259,8 @@ impl Recording {
                 } => {
                     // Without states there is nobody to give them to.
                     if self.header.scene.channels.state.is_on() {
-                        let row = self.metrics.entry(step).or_default();
+                        let row = self.metrics.entry(step);
+                        let row = row.or_insert_with(|| Vec::with_capacity(METRICS.len()));
                         // Twice is enough to know that a row stands there more than once.
                         if row.len() < 2 * METRICS.len() {
                             row.push((name, value));
