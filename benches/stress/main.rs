@@ -25,6 +25,7 @@ mod hand_made;
 mod outcome;
 mod random;
 mod report;
+mod stiffness;
 mod verify;
 
 use report::Row;

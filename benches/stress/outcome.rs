@@ -1,11 +1,12 @@
 //! One case: a scene run to its end, and what has become of it.
 
+use super::stiffness::Spectrum;
 use super::verify::{Answer, Check};
 use softjam::contact::ContactError;
 use softjam::contact::solver::SolverError;
 use softjam::disks;
 use softjam::packing::Packing;
-use softjam::relax::{RelaxError, Relaxation, Status};
+use softjam::relax::{RelaxError, Relaxation, Stability, Status};
 use softjam::scene::{Scene, SceneError, start};
 use std::f64::consts::PI;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,9 +22,14 @@ pub struct Outcome {
     pub steps: u64,
     /// The check by formulas of its own; `None` where there is no answer to check.
     pub check: Option<Check>,
+    /// What the run says of its balance; `None` where there is none.
+    pub stability: Option<Stability>,
     /// What is wrong with it; `None` is a pass.
     pub wrong: Option<String>,
 }
+
+/// Packings up to this size have all their eigenvalues computed.
+const EIGENVALUES: usize = 130;
 
 /// Runs a scene from its own start.
 pub fn of_scene(scene: &Scene) -> Outcome {
@@ -58,6 +64,7 @@ fn guarded(scene: &Scene, packing: impl FnOnce() -> Result<Packing, SceneError>)
         message: String::new(),
         steps: 0,
         check: None,
+        stability: None,
         wrong: Some("a panic".into()),
     })
 }
@@ -143,6 +150,14 @@ fn ended(scene: &Scene, run: &Relaxation, status: Status) -> Outcome {
     let balance = scene.threshold * 1.001 + 1e-14;
     if converged {
         ask(c.f_max <= balance, format!("f_max is {:.1e}", c.f_max));
+        if run.packing().len() <= EIGENVALUES {
+            let spectrum = Spectrum::of_run(run, scene.forces);
+            let stability = run.stability();
+            ask(
+                spectrum.bears_out(run),
+                format!("called {stability:?}, with {spectrum:?}"),
+            );
+        }
     } else {
         ask(c.f_max > scene.threshold * 0.999, "it had converged".into());
         ask(run.step() >= scene.steps, "before the step limit".into());
@@ -152,6 +167,7 @@ fn ended(scene: &Scene, run: &Relaxation, status: Status) -> Outcome {
         message: String::new(),
         steps: run.step(),
         check: Some(c),
+        stability: run.stability(),
         wrong,
     }
 }
@@ -164,6 +180,7 @@ impl Outcome {
             message: error.to_string(),
             steps: 0,
             check: None,
+            stability: None,
             wrong: None,
         }
     }
@@ -194,6 +211,7 @@ fn refused(scene: &Scene, error: &SceneError) -> Outcome {
         message: error.to_string(),
         steps: 0,
         check: None,
+        stability: None,
         wrong: (!right).then(|| format!("the reason does not hold: {error}")),
     }
 }
@@ -229,6 +247,7 @@ fn failed(error: &RelaxError, packing: &Packing, steps: u64, check: Option<Check
         message: error.to_string(),
         steps,
         check,
+        stability: None,
         wrong: (!right).then(|| format!("the reason does not hold: {error}")),
     }
 }

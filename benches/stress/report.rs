@@ -2,6 +2,7 @@
 
 use super::families::Family;
 use super::outcome::Outcome;
+use softjam::relax::Stability;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -13,6 +14,8 @@ pub struct Row {
     cases: usize,
     converged: usize,
     wrong: Vec<String>,
+    /// Converged cases that are a minimum, a saddle, not jammed, not judged.
+    judged: [usize; 4],
     /// Reasons other than convergence: how often, and the first case with its message.
     reasons: BTreeMap<&'static str, (usize, String)>,
     f_max: f64,
@@ -33,6 +36,7 @@ impl Row {
             cases: 0,
             converged: 0,
             wrong: Vec::new(),
+            judged: [0; 4],
             reasons: BTreeMap::new(),
             f_max: 0.0,
             law: 0.0,
@@ -59,6 +63,12 @@ impl Row {
             self.wrong.push(format!("{name}: {wrong}"));
         } else if outcome.end == "converged" {
             self.converged += 1;
+            match outcome.stability {
+                Some(Stability::Minimum) => self.judged[0] += 1,
+                Some(Stability::Saddle) => self.judged[1] += 1,
+                Some(Stability::NotJammed) => self.judged[2] += 1,
+                Some(Stability::NotJudged) | None => self.judged[3] += 1,
+            }
         } else {
             let first = match outcome.check {
                 _ if !outcome.message.is_empty() => {
@@ -123,8 +133,8 @@ pub fn markdown(rows: &[Row], lines: &str) -> String {
         processor()
     );
     text.push_str(
-        "| family | cases | converged | other ends, each with its reason | wrong | f_max, at most | law broken by at most | steps, at most | squeeze, at most | s |\n\
-         | --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+        "| family | cases | converged | minimum, saddle, not jammed, not judged | other ends, each with its reason | wrong | f_max, at most | law broken by at most | steps, at most | squeeze, at most | s |\n\
+         | --- | ---: | ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
     for r in rows {
         let reasons: Vec<String> = r
@@ -134,10 +144,11 @@ pub fn markdown(rows: &[Row], lines: &str) -> String {
             .collect();
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {:.1e} | {:.1e} | {} | {:.3} | {:.1} |",
+            "| {} | {} | {} | {} | {} | {} | {:.1e} | {:.1e} | {} | {:.3} | {:.1} |",
             r.name,
             r.cases,
             r.converged,
+            r.judged.map(|n| n.to_string()).join(", "),
             if reasons.is_empty() {
                 "–".into()
             } else {
@@ -185,7 +196,8 @@ checked by code that shares nothing with the solver (`benches/stress/verify.rs`:
 all pairs and all periodic images): the contact law `f > 0`, `gap = 0` at contacts, `gap ≥ 0` elsewhere; the net forces against
 the threshold; that no second image of a neighbour touches. A step limit counts only if `f_max` is above the threshold; an
 error only if its reason is found to hold (a box is called too small only where a second image does overlap, forces are called
-absurd only where a bulge is bound by more than five radii). *Wrong* is whatever fails this, a panic or a NaN.
+absurd only where a bulge is bound by more than five radii). Of packings of up to 130 particles all eigenvalues of the stiffness
+have to bear out that they are a minimum or a saddle (`benches/stress/stiffness.rs`). *Wrong* is whatever fails this, a panic or a NaN.
 
 `f_max` in units of γ, of converged cases. *Law broken by*: largest gap at a contact or overlap elsewhere, relative to the largest
 overlap of the undeformed disks (packings whose overlaps are all below 1e-5 are checked to round-off and left out here).

@@ -48,13 +48,13 @@ pub struct Check {
 }
 
 /// The kernel g(θ), even and 2π-periodic.
-fn g(theta: f64) -> f64 {
+pub fn g(theta: f64) -> f64 {
     let t = theta.rem_euclid(2.0 * PI);
     (PI - t) * t.sin() - 0.5 * t.cos() - 1.0
 }
 
 /// Its derivative, odd; the two slopes of the cusp at 0 cancel.
-fn slope(theta: f64) -> f64 {
+pub fn slope(theta: f64) -> f64 {
     let t = theta.rem_euclid(2.0 * PI);
     if t == 0.0 {
         return 0.0;
@@ -181,7 +181,7 @@ impl Answer<'_> {
     }
 
     /// `r_i − r_j` to the nearest image.
-    fn nearest(&self, i: usize, j: usize) -> [f64; 2] {
+    pub fn nearest(&self, i: usize, j: usize) -> [f64; 2] {
         [0, 1].map(|k| {
             let d = self.centres[i][k] - self.centres[j][k];
             d - self.sides[k] * (d / self.sides[k]).round()

@@ -7,6 +7,7 @@ use softjam::contact::FrameContacts;
 use softjam::droplet::validity::{SQUEEZE_LIMIT, Validity};
 use softjam::frame::Frame;
 use softjam::record::Outcome;
+use softjam::relax::Stability;
 use softjam::replay::{Event, ReadError, Recording};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -118,18 +119,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 
 fn state_of(found: &Findings, closed: bool) -> String {
     match (found.result, closed) {
-        (Some(end), _) if end.converged => {
-            format!(
-                "converged in {} steps, f_max = {:.3e} γ",
-                end.steps, end.f_max
-            )
-        }
-        (Some(end), _) => {
-            format!(
-                "not converged within {} steps, f_max = {:.3e} γ",
-                end.steps, end.f_max
-            )
-        }
+        (Some(end), _) => format!("{end}, f_max = {:.3e} γ", end.f_max),
         (None, true) => "unfinished: the run was interrupted or failed".to_owned(),
         (None, false) => "unfinished: the file breaks off".to_owned(),
     }
@@ -221,6 +211,7 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
         "box": [l.x, l.y],
         "closed": closed,
         "converged": found.result.map(|r| r.converged),
+        "stability": found.result.and_then(|r| r.stability).map(Stability::name),
         "steps": found.result.map(|r| r.steps),
         "f_max": found.result.map(|r| r.f_max),
         "channels": channels,

@@ -13,7 +13,7 @@ use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
 use softjam::record::{self, Format, Header, RecordError, Summary, Writer};
-use softjam::relax::Relaxation;
+use softjam::relax::{Relaxation, Stability};
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
 use softjam::threads;
@@ -411,8 +411,10 @@ fn report(
     let l = packing.domain().lengths();
     let verdict = match summary.outcome {
         None => format!("interrupted at step {}", run.step()),
-        Some(end) if end.converged => format!("converged in {} steps", end.steps),
-        Some(end) => format!("not converged within {} steps", end.steps),
+        Some(end) if end.stability == Some(Stability::Saddle) => {
+            format!("{end} (--minimizer fire+newton goes on from there)")
+        }
+        Some(end) => end.to_string(),
     };
     let mut lines = Lines::default();
     lines.line("result", verdict);

@@ -269,6 +269,9 @@ impl<W: Write> Recorder for McapRecorder<W> {
     fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written> {
         self.flush()?;
         if let Some(outcome) = outcome {
+            let stability = outcome
+                .stability
+                .map(|s| ("stability", s.name().to_owned()));
             let result = [
                 ("converged", outcome.converged.to_string()),
                 ("steps", outcome.steps.to_string()),
@@ -276,6 +279,7 @@ impl<W: Write> Recorder for McapRecorder<W> {
                 ("f_max", format!("{:e}", outcome.f_max)),
                 ("digest", hex(*self.digests.finalize().as_bytes())),
             ];
+            let result = result.into_iter().chain(stability);
             self.writer
                 .write_metadata(&metadata(RESULT, result))
                 .map_err(io_error)?;
@@ -333,10 +337,11 @@ fn no_schema() -> McapError {
     io::Error::other("a Foxglove message has no schema").into()
 }
 
-fn metadata<const N: usize>(name: &str, pairs: [(&str, String); N]) -> Metadata {
+fn metadata<'a>(name: &str, pairs: impl IntoIterator<Item = (&'a str, String)>) -> Metadata {
+    let pairs = pairs.into_iter();
     Metadata {
         name: name.to_owned(),
-        metadata: pairs.map(|(key, value)| (key.to_owned(), value)).into(),
+        metadata: pairs.map(|(key, value)| (key.to_owned(), value)).collect(),
     }
 }
 

@@ -54,7 +54,7 @@ pub use writer::{Writer, Written};
 pub(crate) use snapshot::{Snapshots, nanoseconds};
 
 use crate::packing::Packing;
-use crate::relax::{RelaxError, Relaxation, Status};
+use crate::relax::{RelaxError, Relaxation, Stability, Status};
 use crate::scene::{Channels, Scene};
 use crate::text::shown;
 use std::io;
@@ -109,7 +109,7 @@ pub struct Header {
     pub packing: Packing,
     /// The step of the first frame; not 0 if the run goes on from another recording.
     pub from_step: u64,
-    /// The program that writes the recording, as `softjam 0.2.0`.
+    /// The program that writes the recording, as `softjam 0.3.0`.
     pub program: String,
     /// The [revision of the bits](crate::BITS) that its states were computed with.
     pub bits: u32,
@@ -215,8 +215,10 @@ impl Format {
 /// How a run ended, as it is recorded.
 ///
 /// ```
-/// let outcome = softjam::record::Outcome { converged: true, steps: 9, f_max: 1e-11 };
-/// assert!(outcome.converged);
+/// use softjam::{record::Outcome, relax::Stability};
+/// let stability = Some(Stability::Minimum);
+/// let outcome = Outcome { converged: true, steps: 9, f_max: 1e-11, stability };
+/// assert_eq!(outcome.to_string(), "converged in 9 steps to a minimum");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
@@ -226,6 +228,46 @@ pub struct Outcome {
     pub steps: u64,
     /// The last `f_max` (units of γ).
     pub f_max: f64,
+    /// Of a converged run, whether it is a minimum; recordings of 0.2.0 and before do not say.
+    pub stability: Option<Stability>,
+}
+
+impl Outcome {
+    /// How `run` has ended; `None` if it goes on.
+    ///
+    /// ```
+    /// # use softjam::{record::Outcome, relax::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(Outcome::of(&run), None);
+    /// ```
+    #[must_use]
+    pub fn of(run: &Relaxation) -> Option<Self> {
+        let status = run.status();
+        (status != Status::Running).then(|| Self {
+            converged: status == Status::Converged,
+            steps: run.step(),
+            f_max: run.f_max(),
+            stability: run.stability(),
+        })
+    }
+}
+
+/// In words, such as `converged in 9 steps to a minimum`.
+impl core::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let steps = self.steps;
+        if !self.converged {
+            return write!(f, "not converged within {steps} steps");
+        }
+        write!(f, "converged in {steps} steps")?;
+        match self.stability {
+            Some(Stability::Minimum) => write!(f, " to a minimum"),
+            Some(Stability::Saddle) => write!(f, " on a saddle: balanced, but not stable"),
+            Some(Stability::NotJammed) => write!(f, ", not jammed: no contact bears a force"),
+            Some(Stability::NotJudged) => write!(f, ", minimum or saddle not judged"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What a recorded run came to.
@@ -363,11 +405,7 @@ pub fn record_live(
             }
         }
         if last {
-            let outcome = (status != Status::Running).then(|| Outcome {
-                converged: status == Status::Converged,
-                steps: run.step(),
-                f_max: run.f_max(),
-            });
+            let outcome = Outcome::of(run);
             // Every file is closed, whatever becomes of the others.
             let closed: Vec<_> = writers.into_iter().map(|w| w.finish(outcome)).collect();
             let files = closed.into_iter().collect::<Result<_, _>>()?;

@@ -29,7 +29,9 @@ use super::images::ImageRows;
 use super::rows::{Batch, MetricRow, Rows};
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
 use crate::force::METRICS;
-use rerun::external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt64Array};
+use rerun::external::arrow::array::{
+    BooleanArray, Float64Array, StringArray, UInt8Array, UInt64Array,
+};
 use rerun::external::arrow::buffer::OffsetBuffer;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
@@ -152,7 +154,7 @@ impl<W: Write> Chunks<W> {
         (states, digest): (u64, [u8; 32]),
     ) -> io::Result<Written> {
         if let Some(outcome) = outcome {
-            let result = DynamicArchetype::new("softjam.Result")
+            let mut result = DynamicArchetype::new("softjam.Result")
                 .with_component_from_data(
                     "converged",
                     array(BooleanArray::from(vec![outcome.converged])),
@@ -160,6 +162,10 @@ impl<W: Write> Chunks<W> {
                 .with_component_from_data("steps", array(UInt64Array::from(vec![outcome.steps])))
                 .with_component_from_data("f_max", array(Float64Array::from(vec![outcome.f_max])))
                 .with_component_from_data("digest", array(UInt8Array::from(digest.to_vec())));
+            if let Some(stability) = outcome.stability {
+                let name = array(StringArray::from(vec![stability.name()]));
+                result = result.with_component_from_data("stability", name);
+            }
             self.encoder
                 .single(&self.store, "/result", TimePoint::default(), &result)?;
         }

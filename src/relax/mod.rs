@@ -23,8 +23,10 @@ pub mod fire;
 pub mod frequency;
 pub mod newton;
 mod present;
+mod stability;
 mod status;
 
+pub use stability::Stability;
 pub use status::{RelaxError, Status};
 
 use crate::contact::{ACCEPTED, ContactError, ContactLaw};
@@ -36,6 +38,8 @@ use crate::packing::Packing;
 use crate::scene::{Minimizer, Scene, start};
 use fire::{Fire, FireState};
 use newton::{Attempt, Newton};
+use stability::Judgement;
+use std::sync::OnceLock;
 
 /// A packing on its way to mechanical equilibrium.
 ///
@@ -68,6 +72,8 @@ pub struct Relaxation {
     net: Vec<Vec2>,
     f_max: f64,
     disks: Option<DiskReport>,
+    /// What this frame is, if it is in balance and somebody asked.
+    judgement: OnceLock<Judgement>,
     yielded: bool,
     failed: bool,
 }
@@ -147,6 +153,7 @@ impl Relaxation {
             step_limit: scene.steps,
             f_max: 0.0,
             disks: None,
+            judgement: OnceLock::new(),
             yielded: false,
             failed: false,
         };
@@ -193,6 +200,9 @@ impl Relaxation {
     /// assert_eq!(run.step(), 1);
     /// ```
     pub fn advance(&mut self) -> Result<(), RelaxError> {
+        if self.is_on_saddle() {
+            return self.leave_saddle();
+        }
         if self.finish() {
             self.step += 1;
             self.balance();
@@ -224,12 +234,39 @@ impl Relaxation {
                 dt_max: self.state.dt_max,
             });
         }
-        if let Err(source) = self.solve(moved) {
-            self.failed = true;
-            let step = self.step;
-            return Err(RelaxError::Contact { step, source });
+        self.solve_or_fail(moved)
+    }
+
+    /// Whether Newton's method has come to a saddle, and the run goes on for that.
+    fn is_on_saddle(&self) -> bool {
+        self.newton.is_some() && self.stability() == Some(Stability::Saddle)
+    }
+
+    /// A step down from a saddle: the particles are displaced along the direction that grows, the farthest by
+    /// [`LEAVE`] of the smallest radius, and FIRE goes on from there, at rest, for as long as after a step of Newton's method
+    /// that was given up.
+    fn leave_saddle(&mut self) -> Result<(), RelaxError> {
+        let way_down = self.judgement.take().map_or_else(Vec::new, |j| j.way_down);
+        let longest = way_down.iter().fold(0.0, |m: f64, u| m.max(u.norm()));
+        let moved = LEAVE * self.packing.smallest_radius();
+        let domain = self.packing.domain();
+        for (x, u) in self.packing.positions_mut().iter_mut().zip(&way_down) {
+            *x = domain.wrap(*x + u * (moved / longest));
         }
-        Ok(())
+        self.state.turns.fail();
+        self.state.restart(&self.fire);
+        self.velocities.fill(Vec2::zeros());
+        self.step += 1;
+        // Rounding may take the farthest a little farther.
+        self.solve_or_fail(1.01 * moved)
+    }
+
+    fn solve_or_fail(&mut self, moved: f64) -> Result<(), RelaxError> {
+        let step = self.step;
+        self.solve(moved).map_err(|source| {
+            self.failed = true;
+            RelaxError::Contact { step, source }
+        })
     }
 
     /// One step of Newton's method, where it is its turn; `false` if the move is left to FIRE.
@@ -315,9 +352,27 @@ impl Relaxation {
     }
 
     fn balance(&mut self) {
+        self.judgement.take();
         self.form
             .evaluate_law(&self.law, &self.packing, &mut self.net);
         self.f_max = largest_force(&self.net) / self.law.line_tension();
+    }
+
+    /// Whether `f_max` is not above the threshold, and the contact law is fulfilled.
+    fn is_balanced(&self) -> bool {
+        self.f_max <= self.threshold && self.law.residual() <= self.law.accepted_residual()
+    }
+
+    /// Whether a frame in balance is a minimum or a saddle; `None` while it is not in balance.
+    ///
+    /// It is a function of positions, contacts and forces alone, found when it is asked for the first time.
+    ///
+    /// See the example of [`Stability`].
+    #[must_use]
+    pub fn stability(&self) -> Option<Stability> {
+        let judge = || stability::judge(&self.packing, &self.law, self.form.form(), self.f_max);
+        self.is_balanced()
+            .then(|| self.judgement.get_or_init(judge).stability)
     }
 
     /// How the run stands at this frame.
@@ -331,9 +386,7 @@ impl Relaxation {
     pub fn status(&self) -> Status {
         if self.failed {
             Status::Failed
-        } else if self.f_max <= self.threshold
-            && self.law.residual() <= self.law.accepted_residual()
-        {
+        } else if self.is_balanced() && !self.is_on_saddle() {
             Status::Converged
         } else if self.step >= self.step_limit {
             Status::StepLimit
@@ -360,6 +413,9 @@ impl Iterator for Relaxation {
         Some(Ok(self.frame()))
     }
 }
+
+/// How far a step down from a saddle takes the particle that moves most, in units of the smallest radius.
+const LEAVE: f64 = 0.02;
 
 /// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Geometric means of the steps
 /// with 1.0, 1.2 and 1.3 (the first with α_start = 0.25, the others with 0.1), N = 1024: 3184, 2654, 2573 at φ = 0.86 (96 seeds);

@@ -333,7 +333,7 @@ impl Balance {
     /// let run = Relaxation::new(&scene).unwrap();
     /// let mut balance = Balance::new(&scene);
     /// balance.check(run.packing(), &run.frame(), &[]);
-    /// let claim = Outcome { converged: true, steps: 0, f_max: 0.0 };
+    /// let claim = Outcome { converged: true, steps: 0, f_max: 0.0, stability: None };
     /// assert!(!balance.bears_out(&claim, 0.0), "the first frame is far from balance");
     /// ```
     #[must_use]

@@ -163,7 +163,7 @@ pub fn determinism(
     mut watch: impl FnMut(&State),
 ) -> Result<Determinism, ReplayError> {
     let scene = recording.scene().clone();
-    let same_revision = recording.bits() == crate::BITS;
+    let same_revision = recording.has_same_bits();
     let bytes = match file {
         Some(file) if same_revision => {
             let header = recording.header()?;

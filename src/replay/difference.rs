@@ -2,6 +2,7 @@
 
 use crate::domain::Vec2;
 use crate::frame::Frame;
+use crate::relax::Stability;
 use crate::relax::fire::FireState;
 use core::fmt;
 
@@ -84,6 +85,13 @@ pub enum What {
     Converged {
         /// Whether the run has converged there.
         there: bool,
+    },
+    /// The recorded result says something else of the balance.
+    Stability {
+        /// What it says.
+        here: Option<Stability>,
+        /// What the run's end is.
+        there: Option<Stability>,
     },
     /// The recorded result names another number of steps than its last state.
     Steps {
@@ -225,6 +233,11 @@ impl fmt::Display for Difference {
                 f,
                 "the run does not end here (f_max = {f_max:e} γ), and the recording says that it did"
             ),
+            What::Stability { here, there } => {
+                let name = |s: &Option<Stability>| s.map_or("not in balance", Stability::name);
+                let (here, there) = (name(here), name(there));
+                write!(f, "the result calls it {here}, and the run ends {there}")
+            }
             What::Converged { there } => {
                 let word = if *there { "has" } else { "has not" };
                 write!(

@@ -314,6 +314,14 @@ impl Recording {
         &self.header.program
     }
 
+    /// Whether this program gives the bits of the run that was recorded, whatever version that was.
+    ///
+    /// See the example of [`determinism`](super::determinism()).
+    #[must_use]
+    pub fn has_same_bits(&self) -> bool {
+        crate::has_same_bits(self.header.bits, self.scene())
+    }
+
     /// The [revision of the bits](crate::BITS) that it was recorded with.
     ///
     /// See the example of [`Recording`].

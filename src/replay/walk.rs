@@ -107,6 +107,12 @@ impl End {
                 Some(What::Converged { there: converged })
             }
             (Some(end), true) if end.steps != step => Some(What::Steps { here: end.steps }),
+            (Some(end), true) if end.stability.is_some() && end.stability != run.stability() => {
+                Some(What::Stability {
+                    here: end.stability,
+                    there: run.stability(),
+                })
+            }
             (Some(end), true) => difference::numbers(&[end.f_max], &[run.f_max()], |_| {
                 "f_max of the result".into()
             }),

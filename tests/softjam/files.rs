@@ -39,11 +39,7 @@ pub fn record_all(
             recorder.record(&snapshot)?;
         }
         if last {
-            return recorder.finish(Some(Outcome {
-                converged: run.status() == Status::Converged,
-                steps: run.step(),
-                f_max: run.f_max(),
-            }));
+            return recorder.finish(Outcome::of(&run));
         }
         run.advance().expect("a step");
     }

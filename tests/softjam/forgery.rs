@@ -6,7 +6,7 @@ use crate::files::{FORMATS, open, recorder};
 use softjam::domain::Vec2;
 use softjam::force::{Form, METRICS};
 use softjam::record::{Format, Header, Outcome, Snapshot};
-use softjam::relax::{Relaxation, Status};
+use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Balance, Bytes, Way, determinism};
 use softjam::scene::{Minimizer, Scene, Schedule};
 use std::io::Cursor;
@@ -44,11 +44,7 @@ impl Run {
             }
             run.advance().expect("a step");
         }
-        let outcome = Some(Outcome {
-            converged: true,
-            steps: run.step(),
-            f_max: run.f_max(),
-        });
+        let outcome = Outcome::of(&run);
         Self {
             header,
             snapshots,
@@ -207,18 +203,22 @@ const STATE: [(&str, Forge); 4] = [
             converged: random.below(2) == 0,
             steps: last.step,
             f_max,
+            stability: None,
         });
     }),
 ];
 
 /// What is forged of the result.
-const RESULT: [(&str, Forge); 4] = [
+const RESULT: [(&str, Forge); 5] = [
     ("converged", |run, _| {
         result(run, |end| end.converged = false);
     }),
     ("steps", |run, _| result(run, |end| end.steps += 1)),
     ("f_max", |run, _| {
         result(run, |end| end.f_max = end.f_max.next_down());
+    }),
+    ("stability", |run, _| {
+        result(run, |end| end.stability = Some(Stability::Saddle));
     }),
     ("no result", |run, _| run.outcome = None),
 ];

@@ -13,5 +13,6 @@ mod matrix;
 mod model;
 mod newton;
 mod relaxation;
+mod stability;
 mod stress;
 mod work;

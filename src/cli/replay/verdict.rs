@@ -25,6 +25,8 @@ pub(super) struct Findings {
     from_step: u64,
     program: String,
     bits: u32,
+    /// Whether this program gives the recorded bits.
+    same_bits: bool,
     /// What the file does not record.
     without: Vec<&'static str>,
 }
@@ -112,6 +114,7 @@ pub(super) fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
         from_step: recording.from_step(),
         program: recording.program().to_owned(),
         bits: recording.bits(),
+        same_bits: recording.has_same_bits(),
         without: channels
             .iter()
             .filter_map(|(name, schedule)| (!schedule.is_on()).then_some(*name))
@@ -139,7 +142,7 @@ impl Findings {
 
     /// What `f_max` may be off by between revisions of the bits: the rounding of its sums.
     fn tolerance(&self) -> f64 {
-        if self.bits == BITS { 0.0 } else { 1e-14 }
+        if self.same_bits { 0.0 } else { 1e-14 }
     }
 
     /// What the file lacks, if it lacks something.
@@ -276,7 +279,7 @@ impl Findings {
         let mut lines = Lines::default();
         lines.line("file", path.display());
         if let Some(d) = &self.determinism {
-            if self.bits != BITS {
+            if !self.same_bits {
                 let (theirs, program) = (self.bits, &self.program);
                 lines.line(
                     "revision",

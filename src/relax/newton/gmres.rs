@@ -131,7 +131,7 @@ impl Gmres {
 }
 
 /// The sum of products in one fixed order, eight chains wide.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(in crate::relax) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();
     let mut sums = [0.0; 8];

@@ -28,7 +28,7 @@ use crate::packing::Packing;
 
 /// The buffers of the products.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Linear {
+pub(in crate::relax) struct Linear {
     turning: Turning,
     torques: Vec<f64>,
     /// `dd`, `dφ`, the right-hand side and `df`, one entry a contact.
@@ -43,7 +43,7 @@ pub(super) struct Linear {
 }
 
 /// The linearised problem at one frame.
-pub(super) struct At<'a> {
+pub(in crate::relax) struct At<'a> {
     buffers: &'a mut Linear,
     form: Form,
     contacts: Contacts<'a>,
@@ -52,7 +52,7 @@ pub(super) struct At<'a> {
 
 impl Linear {
     /// The problem at the contacts that `law` found last.
-    pub(super) fn at<'a>(
+    pub(in crate::relax) fn at<'a>(
         &'a mut self,
         form: Form,
         law: &'a ContactLaw,
@@ -109,7 +109,7 @@ impl At<'_> {
     }
 
     /// `y = J x`, the contact problem in it solved as by [`forces`](Self::forces).
-    pub(super) fn product(&mut self, x: &[f64], y: &mut [f64], tolerance: f64) -> bool {
+    pub(in crate::relax) fn product(&mut self, x: &[f64], y: &mut [f64], tolerance: f64) -> bool {
         if !self.forces(x, tolerance) {
             return false;
         }

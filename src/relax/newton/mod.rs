@@ -56,9 +56,10 @@ use crate::contact::solver::ConjugateGradient;
 use crate::domain::Vec2;
 use crate::force::{NetForces, sum_of_forces};
 use crate::packing::Packing;
+pub(super) use gmres::dot;
 use gmres::{Gmres, Report};
-use linear::Linear;
-use stiffness::Stiffness;
+pub(super) use linear::Linear;
+pub(super) use stiffness::Stiffness;
 
 /// How FIRE and Newton's method take turns: part of the minimiser's state.
 ///

@@ -14,7 +14,7 @@ type Block = [[f64; 2]; 2];
 
 /// `K̃` and its factor.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stiffness {
+pub(in crate::relax) struct Stiffness {
     pointers: Vec<u32>,
     rows: Vec<u32>,
     blocks: Vec<Block>,
@@ -23,7 +23,7 @@ pub(super) struct Stiffness {
 
 impl Stiffness {
     /// Builds and factorises `K̃` of `contacts` among `particles` particles; `compliances` are the `A_cc`.
-    pub(super) fn rebuild(
+    pub(in crate::relax) fn rebuild(
         &mut self,
         contacts: &Contacts<'_>,
         compliances: &[f64],
@@ -64,7 +64,7 @@ impl Stiffness {
     }
 
     /// `x ← K̃⁻¹ x`.
-    pub(super) fn solve(&self, x: &mut [f64]) {
+    pub(in crate::relax) fn solve(&self, x: &mut [f64]) {
         self.factor.solve(x);
     }
 }

@@ -12,6 +12,7 @@ use crate::record::Outcome;
 use crate::record::messages::{
     ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage, topic,
 };
+use crate::relax::Stability;
 use crate::relax::fire::FireState;
 use crate::scene::Scene;
 use crate::text::shown;
@@ -275,6 +276,10 @@ fn read_result(metadata: &BTreeMap<String, String>) -> Result<Item, String> {
             converged: text("converged")?.parse().ok()?,
             steps: text("steps")?.parse().ok()?,
             f_max: text("f_max")?.parse().ok()?,
+            stability: match text("stability") {
+                Some(name) => Some(Stability::from_name(name)?),
+                None => None,
+            },
         };
         let digest = blake3::Hash::from_hex(text("digest")?).ok()?;
         Some(Item::Result(outcome, *digest.as_bytes()))

@@ -10,6 +10,7 @@ use crate::domain::Vec2;
 use crate::force::METRICS;
 use crate::frame::Frame;
 use crate::record::Outcome;
+use crate::relax::Stability;
 use crate::relax::fire::FireState;
 use crate::text::shown;
 use rerun::external::re_log_types::StoreId;
@@ -208,10 +209,15 @@ fn read_result(chunk: &Chunk) -> Option<Item> {
     let mut steps = chunk.iter_slices::<u64>("softjam.Result:steps".into());
     let mut f_max = chunk.iter_slices::<f64>("softjam.Result:f_max".into());
     let mut digest = chunk.iter_slices::<u8>("softjam.Result:digest".into());
+    let mut stability = chunk.iter_slices::<String>("softjam.Result:stability".into());
     let outcome = Outcome {
         converged,
         steps: steps.next()?.first().copied()?,
         f_max: f_max.next()?.first().copied()?,
+        stability: match stability.next() {
+            Some(names) => Some(Stability::from_name(names.first()?)?),
+            None => None,
+        },
     };
     Some(Item::Result(outcome, digest.next()?.try_into().ok()?))
 }
