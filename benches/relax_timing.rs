@@ -14,7 +14,7 @@
 
 use softjam::disks;
 use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::relax::{Relaxation, Stability, Status};
 use softjam::scene::{Scene, start};
 use std::error::Error;
 use std::fmt::Write as _;
@@ -56,6 +56,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         run.advance()?;
     }
     let steps_s = clock.elapsed().as_secs_f64();
+    // Newton's method has asked already.
+    let clock = Instant::now();
+    let stability = run.stability().map_or("not in balance", Stability::name);
+    let judged_s = clock.elapsed().as_secs_f64();
 
     if let Some(folder) = &folder {
         write_packing(&folder.join("end.txt"), run.packing())?;
@@ -70,6 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!(
         "{{\"particles\": {}, \"phi\": {}, \"seed\": {}, \"converged\": {}, \"f_max\": {:e}, \"residual\": {:e}, \
          \"disks_s\": {disks_s:.6}, \"disks_steps\": {}, \"first_s\": {first_s:.6}, \"steps_s\": {steps_s:.6}, \
+         \"judged_s\": {judged_s:.6}, \"stability\": \"{stability}\", \
          \"steps\": {}, \"solves\": {}, \"sweeps\": {}, \"iterations\": {}, \"contacts\": {}}}",
         run.packing().len(),
         scene.phi,

@@ -94,8 +94,3 @@ mod wide;
 ///
 /// Revision 2: Newton's method leaves a saddle instead of ending there. Runs by FIRE alone are those of revision 1.
 pub const BITS: u32 = 2;
-
-/// Whether a run of `scene` has the same bits with a program of another `revision`.
-pub(crate) fn has_same_bits(revision: u32, scene: &scene::Scene) -> bool {
-    revision == BITS || (revision == 1 && scene.minimizer == scene::Minimizer::Fire)
-}

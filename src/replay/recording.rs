@@ -15,7 +15,7 @@ use crate::force::METRICS;
 use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
 use crate::record::{Format, Outcome, PROGRAM};
-use crate::scene::Scene;
+use crate::scene::{Minimizer, Scene};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -319,7 +319,9 @@ impl Recording {
     /// See the example of [`determinism`](super::determinism()).
     #[must_use]
     pub fn has_same_bits(&self) -> bool {
-        crate::has_same_bits(self.header.bits, self.scene())
+        // Revision 2 changed Newton's method alone.
+        let unchanged = self.header.bits == 1 && self.scene().minimizer == Minimizer::Fire;
+        self.header.bits == crate::BITS || unchanged
     }
 
     /// The [revision of the bits](crate::BITS) that it was recorded with.

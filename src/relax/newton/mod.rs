@@ -322,7 +322,7 @@ impl Newton {
         let compliances = law.matrix().diagonal();
         if self
             .stiffness
-            .rebuild(&contacts, compliances, packing.len())
+            .rebuild(&contacts, compliances, packing.len(), 0.0)
             .is_err()
         {
             return false;
