@@ -75,7 +75,7 @@ fn scale<const N: usize>(
     marks: [(&str, f32); N],
     [left, bottom, width, height]: [f32; 4],
 ) -> Points2D {
-    let mut places = vec![[left, bottom + 1.14 * height]];
+    let mut places = vec![[left, bottom + 1.22 * height]];
     places.extend(marks.map(|(_, part)| [left + 2.2 * width, bottom + part * height]));
     let labels = core::iter::once(title).chain(marks.map(|(label, _)| label));
     Points2D::new(places)
