@@ -7,7 +7,8 @@ colours that they should have. The same checks are held against pictures that ar
 exchanged), which have to fail.
 
 usage: viewer.py FOLDER RUN.rrd...       writes FOLDER/RUN.png for each recording
-(pip install rerun-sdk==0.36.3 numpy matplotlib; mesa-vulkan-drivers, or a GPU)
+       viewer.py --same A.png B.png      whether two pictures show the same, but for what differs between two machines
+(pip install rerun-sdk numpy matplotlib, 0.36.3 or 0.41.0; mesa-vulkan-drivers, or a GPU)
 """
 
 import os
@@ -162,12 +163,18 @@ def look_at_nothing(picture, r):
 
 
 def look_aside(picture, r):
-    """The plots, and the scene as text."""
+    """The plots, each with a curve that fills it, and the scene as text."""
     aside = picture[:, LEFT + 10 :]
     for name, color in CURVES.items():
-        if len(r.curves.get(name, ())) > 1:
-            pixels = near(aside, color, 30).sum()
-            assert pixels > 100, f"the curve of {name} has {pixels} pixels"
+        # A run that is over at once has no curve to speak of.
+        if len(r.curves.get(name, ())) < 20:
+            continue
+        rows, columns = np.nonzero(near(aside[:560], color, 30))
+        assert len(rows) > 100, f"the curve of {name} has {len(rows)} pixels"
+        # The fall has the upper plot for its own, the others share the row below it.
+        room = np.array([270, aside.shape[1]] if name == "log10_f_max" else [170, aside.shape[1] / 3])
+        filled = np.array([np.ptp(rows), np.ptp(columns)]) / room
+        assert (filled > 0.7).all(), f"the curve of {name} fills {filled[0]:.0%} of its plot's height, {filled[1]:.0%} of its width"
     letters = (aside[560:860] > 120).all(axis=-1).mean()
     assert letters > 0.01, f"{letters:.2%} of the text's place is bright"
 
@@ -208,23 +215,50 @@ def screenshot(path, png):
         viewer.wait(30)
 
 
-def must_fail(what, picture, r):
+def must_fail(what, picture, r, check=look):
     try:
-        found = look(picture, r)
+        found = check(picture, r)
     except AssertionError as reason:
         print(f"{what}: refused, as it should be ({reason})")
         return
     raise AssertionError(f"{what} passes: {found}")
 
 
+def whole_messages(path, folder):
+    """The recording up to its last whole message: newer viewers open no file that breaks off within one."""
+    data, end = path.read_bytes(), 12
+    while end + 16 <= len(data):
+        length = int.from_bytes(data[end + 8 : end + 16], "little")
+        if end + 16 + length > len(data):
+            break
+        end += 16 + length
+    if end == len(data):
+        return path
+    (folder / path.name).write_bytes(data[:end])
+    return folder / path.name
+
+
+def same(one, other):
+    """Fonts and lines are drawn a shade differently on another machine; a wrong picture differs in thousands of places."""
+    one, other = (np.array(Image.open(p).convert("RGB")).astype(int) for p in (one, other))
+    assert one.shape == other.shape, f"{one.shape} and {other.shape}"
+    differ = (np.abs(one - other)[TOP:BOTTOM].max(axis=-1) > 60).mean()
+    assert differ < 0.004, f"{differ:.2%} of the places differ"
+    print(f"{differ:.3%} of the places differ")
+
+
 def main():
+    if sys.argv[1] == "--same":
+        return same(*sys.argv[2:])
     folder, paths = Path(sys.argv[1]).resolve(), [Path(p) for p in sys.argv[2:]]
     folder.mkdir(exist_ok=True)
     seen = []
     for path in paths:
         begin = time.monotonic()
-        r = Recording(str(path))
-        picture = screenshot(path, folder / f"{path.stem}.png")
+        with tempfile.TemporaryDirectory() as rest:
+            whole = whole_messages(path, Path(rest))
+            r = Recording(str(whole))
+            picture = screenshot(whole, folder / f"{path.stem}.png")
         # So many colours are enough for the eye and a third of the bytes.
         small = Image.fromarray(picture.astype(np.uint8)).quantize(224, kmeans=1, dither=Image.Dither.NONE)
         small.save(folder / f"{path.stem}.png", optimize=True)
@@ -250,7 +284,10 @@ def main():
             must_fail("upside down", upside_down, r)
         must_fail("red and blue exchanged", shuffled, r)
         must_fail("empty", empty, r)
-    _, r, _, path = full[-1]
+    picture, r, _, path = full[-1]
+    no_curves = picture.copy()
+    no_curves[60:560, LEFT + 10 :] = 0
+    must_fail("without curves", no_curves, r, look_aside)
     with tempfile.TemporaryDirectory() as rest:
         for entity in ("contours", "contours/images", "particles", "contacts", "contacts/images"):
             smaller = without(f"/world/{entity}", path, Path(rest))
