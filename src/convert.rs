@@ -149,6 +149,8 @@ pub fn convert(
     while damage.is_none() {
         match recording.next() {
             None => break,
+            // Not damaged, but not of one run: half of it would be of no use.
+            Some(Err(error @ ReadError::Join { .. })) => return Err(error.into()),
             Some(Err(error)) => damage = Some(error),
             Some(Ok(Event::State(frame))) => conversion.arrive(recording, frame)?,
             Some(Ok(Event::Metric {

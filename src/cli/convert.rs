@@ -8,7 +8,8 @@ use super::{Verdict, print};
 use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
-use softjam::replay::Recording;
+use softjam::replay::{ReadError, Recording};
+use softjam::scene::Channels;
 use softjam::text::shown;
 use std::path::PathBuf;
 
@@ -54,15 +55,26 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let mut recording = Recording::open_within(&arguments.input, arguments.memory.budget())?;
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
-    let header = convert::header(&recording, channels)?;
-    let writer = Writer::start_conversion(output.format, output.begin(arguments.force)?, header)?;
-    let converted = convert::convert(&mut recording, writer, &channels);
+    write(&mut recording, &output, channels, arguments.force)
+}
+
+/// Writes what `channels` ask of a recording, and says what came of it.
+pub(super) fn write(
+    recording: &mut Recording,
+    output: &Output,
+    channels: Channels,
+    force: bool,
+) -> anyhow::Result<Verdict> {
+    let header = convert::header(recording, channels)?;
+    let writer = Writer::start_conversion(output.format, output.begin(force)?, header)?;
+    let converted = convert::convert(recording, writer, &channels);
     let without_states = !recording.scene().channels.state.is_on();
     let converted = converted.map_err(|error| match error {
         ConvertError::Read(error) => {
             let path = shown(&output.path.display().to_string());
+            let joined = !matches!(error, ReadError::Join { .. });
             let error = anyhow::Error::new(error);
-            if without_states || recording.intact().is_some() {
+            if joined && (without_states || recording.intact().is_some()) {
                 error.context(format!("{path} holds what came before the damage"))
             } else {
                 error.context(format!("{path} was not made or replaced"))

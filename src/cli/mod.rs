@@ -6,6 +6,7 @@ mod convert;
 mod figure;
 mod flags;
 mod info;
+mod join;
 mod lines;
 mod live;
 mod manual;
@@ -21,6 +22,7 @@ use softjam::convert::ConvertError;
 use softjam::figure::FigureError;
 use softjam::record::{FORMAT_VERSION, RecordError};
 use softjam::relax::RelaxError;
+use softjam::replay::ReadError;
 use softjam::scene::SceneError;
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -58,6 +60,8 @@ enum Verb {
     Info(info::Arguments),
     /// Convert a recording: .rrd ⇄ .mcap, with more channels or fewer.
     Convert(convert::Arguments),
+    /// Join the parts of a run that was interrupted to the recording that it would have been.
+    Join(join::Arguments),
     /// Draw a packing, or the fall of f_max, as SVG or PNG.
     Figure(figure::Arguments),
     /// Write the manual pages, or print the completions of a shell.
@@ -88,6 +92,7 @@ pub fn run() -> ExitCode {
         Verb::Replay(arguments) => replay::run(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Convert(arguments) => convert::run(&arguments),
+        Verb::Join(arguments) => join::run(&arguments),
         Verb::Figure(arguments) => figure::run(&arguments),
         Verb::Manual(arguments) => manual::run(&arguments, &Cli::command()),
         Verb::Scene(arguments) => scene::run(&arguments),
@@ -140,6 +145,10 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         );
         if is_in_the_way { 2 } else { 1 }
     };
+    let is_join = |e: &ReadError| matches!(e, ReadError::Join { .. });
+    if error.downcast_ref::<ReadError>().is_some_and(is_join) {
+        return 2;
+    }
     if let Some(ConvertError::Write(e)) = error.downcast_ref::<ConvertError>() {
         return file(e);
     }

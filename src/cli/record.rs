@@ -7,15 +7,17 @@ use super::memory::MemoryFlag;
 use super::output::{Output, open_with};
 use super::{Verdict, print, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use softjam::BITS;
 use softjam::budget::Budget;
 use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
-use softjam::record::{self, Format, Header, RecordError, Summary, Writer};
-use softjam::relax::{Relaxation, Stability};
+use softjam::record::{self, Format, Header, Leg, RecordError, Summary, Writer};
+use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
+use softjam::text::shown;
 use softjam::threads;
 use std::io::{BufRead as _, BufReader, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -45,7 +47,8 @@ pub struct Arguments {
     #[command(flatten)]
     scene: SceneFlags,
 
-    /// Go on from a recorded frame of an earlier run of the same scene, exactly as that run did or would have done.
+    /// Go on from a recorded frame of an earlier run, exactly as that run did or would have done; with another --threshold,
+    /// --minimizer or --forces from what these make of the frame.
     #[arg(
         long,
         value_name = "RUN.rrd",
@@ -109,7 +112,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
         },
         Some(path) => recorded_frame(path, arguments)?,
     };
-    let scene = origin.scene().clone();
+    let (scene, legs) = (origin.scene().clone(), origin.legs());
     fits_in_memory(&origin, &arguments.memory)?;
     let outputs = outputs(arguments, &scene)?;
     // Newton's method carries the forces along with the positions; only round-off holds it up.
@@ -135,10 +138,13 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let mut run = match origin {
         Origin::Scene(scene) => Relaxation::new(&scene)?,
         Origin::Packing(scene, packing) => Relaxation::of_packing(&scene, packing)?,
-        Origin::Frame(scene, packing, frame) => Relaxation::resume(&scene, packing, *frame)?,
+        Origin::Frame(from) => from.run()?,
     };
     let disks = start.elapsed();
-    let header = Header::of(&scene, &run);
+    let header = Header {
+        legs,
+        ..Header::of(&scene, &run)
+    };
     let writers = outputs.iter().zip(files);
     let writers = writers.map(|(output, file)| Writer::start(output.format, file, header.clone()));
     let writers = writers.collect::<Result<Vec<_>, _>>()?;
@@ -246,20 +252,97 @@ impl Phase {
 enum Origin {
     Scene(Scene),
     Packing(Scene, Packing),
-    Frame(Scene, Packing, Box<Frame>),
+    Frame(Box<Continuation>),
 }
 
 impl Origin {
     fn scene(&self) -> &Scene {
         match self {
-            Self::Scene(scene) | Self::Packing(scene, _) | Self::Frame(scene, ..) => scene,
+            Self::Scene(scene) | Self::Packing(scene, _) => scene,
+            Self::Frame(from) => &from.scene,
         }
+    }
+
+    fn legs(&self) -> Vec<Leg> {
+        match self {
+            Self::Frame(from) => from.legs.clone(),
+            Self::Scene(_) | Self::Packing(..) => Vec::new(),
+        }
+    }
+}
+
+/// A recorded frame to go on from.
+struct Continuation {
+    scene: Scene,
+    packing: Packing,
+    frame: Frame,
+    /// What the run went by before.
+    legs: Vec<Leg>,
+    /// Whether its scene is changed at the frame.
+    changed: bool,
+}
+
+impl Continuation {
+    fn new(recording: &Recording, scene: Scene, frame: Frame) -> anyhow::Result<Self> {
+        let packing = recording.packing(&frame)?;
+        let leg = Leg::of(recording.scene(), frame.step);
+        let changed = leg.changes(&scene);
+        let legs = recording.legs().iter().copied();
+        let legs = legs.chain(changed.then_some(leg)).collect();
+        if scene.steps < frame.step {
+            return Err(SceneError::Range {
+                field: "steps".to_owned(),
+                value: scene.steps.to_string(),
+                allowed: format!("steps ≥ {}, the step that the run goes on from", frame.step),
+            }
+            .into());
+        }
+        Ok(Self {
+            scene,
+            packing,
+            frame,
+            legs,
+            changed,
+        })
+    }
+
+    fn run(self) -> anyhow::Result<Relaxation> {
+        let begin = if self.changed {
+            Relaxation::take_over
+        } else {
+            Relaxation::resume
+        };
+        let run = begin(&self.scene, self.packing, self.frame)?;
+        // Its replay would have nothing to run.
+        if run.status() != Status::Running && !self.scene.starts_from_disks() {
+            let step = run.step();
+            return Err(SceneError::Needs {
+                field: "from".to_owned(),
+                value: format!("step {step}"),
+                needs: "a run that goes on behind it: with this threshold and step limit it ends there; go on from an earlier --step"
+                    .to_owned(),
+            }
+            .into());
+        }
+        Ok(run)
     }
 }
 
 /// The frame to go on from, and its scene with what the flags change about its end and its recording.
 fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> {
     let mut recording = Recording::open_within(path, arguments.memory.budget())?;
+    if recording.bits() != BITS {
+        return Err(SceneError::Needs {
+            field: "from".to_owned(),
+            value: path.display().to_string(),
+            needs: format!(
+                "a recording with bits {BITS}, as this program computes; it has bits {}, and {} can go on from it",
+                recording.bits(),
+                shown(recording.program())
+            ),
+        }
+        .into());
+    }
     let fields = SceneFields::from_toml(&recording.scene().to_toml())?;
     let scene = arguments.scene.scene_over(fields)?;
     let mut found = None;
@@ -277,10 +360,9 @@ fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> 
     }
     let last = found.as_ref().map(|frame| frame.step);
     match found {
-        Some(frame) if arguments.step.is_none_or(|k| k == frame.step) => {
-            let packing = recording.packing(&frame)?;
-            Ok(Origin::Frame(scene, packing, Box::new(frame)))
-        }
+        Some(frame) if arguments.step.is_none_or(|k| k == frame.step) => Ok(Origin::Frame(
+            Box::new(Continuation::new(&recording, scene, frame)?),
+        )),
         _ if last.is_none() && arguments.step.is_none() => {
             let closed = recording.is_closed();
             Err(SceneError::Needs {
@@ -332,7 +414,8 @@ fn lines_in(path: &str) -> Result<usize, SceneError> {
 fn fits_in_memory(origin: &Origin, memory: &MemoryFlag) -> Result<(), SceneError> {
     let scene = origin.scene();
     let particles = match (origin, &scene.start) {
-        (Origin::Frame(_, packing, _) | Origin::Packing(_, packing), _) => packing.len(),
+        (Origin::Frame(from), _) => from.packing.len(),
+        (Origin::Packing(_, packing), _) => packing.len(),
         (Origin::Scene(_), Start::File { path, .. }) => lines_in(path)?,
         (Origin::Scene(_), Start::Random | Start::Hexagonal) => scene.particles,
     };

@@ -112,6 +112,11 @@ impl<W: Write> Encoder<W> {
         self.written
     }
 
+    /// Lets the sequence of ids begin anew: chunks of two recordings of one run that begin with other steps are not taken for the same.
+    pub fn number_from(&mut self, step: u64) {
+        self.ids += u128::from(step) << 64;
+    }
+
     /// The next of a fixed sequence of row ids.
     pub fn row_id(&mut self) -> RowId {
         self.ids += 1;

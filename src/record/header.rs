@@ -2,7 +2,7 @@
 
 use super::columns::array;
 use super::encode::Encoder;
-use super::{FORMAT_VERSION, Header, legend};
+use super::{FORMAT_VERSION, Header, legend, legs_to_text};
 use crate::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
 use crate::text::shown;
@@ -43,7 +43,7 @@ pub(super) fn write<W: Write>(
     );
     put("/__properties", &RecordingInfo::new().with_name(name))?;
     put("/scene", &TextDocument::from_markdown(text(header)))?;
-    put("/scene", &scene(header))?;
+    put("/scene", &scene(header)?)?;
     let particles = DynamicArchetype::new("softjam.Particles")
         .with_component_from_data(
             "radius",
@@ -90,9 +90,9 @@ pub(super) fn write<W: Write>(
     legend::write(header, put)
 }
 
-fn scene(header: &Header) -> DynamicArchetype {
+fn scene(header: &Header) -> io::Result<DynamicArchetype> {
     let toml = header.scene.to_toml();
-    DynamicArchetype::new("softjam.Scene")
+    let scene = DynamicArchetype::new("softjam.Scene")
         .with_component_from_data("toml", array(StringArray::from(vec![toml])))
         .with_component_from_data(
             "format_version",
@@ -106,7 +106,11 @@ fn scene(header: &Header) -> DynamicArchetype {
         .with_component_from_data(
             "from_step",
             array(UInt64Array::from(vec![header.from_step])),
-        )
+        );
+    Ok(match legs_to_text(&header.legs)? {
+        None => scene,
+        Some(legs) => scene.with_component_from_data("legs", array(StringArray::from(vec![legs]))),
+    })
 }
 
 /// What a scene starts from, in words; those before the number of a random start are `seed`.
@@ -125,7 +129,14 @@ fn text(header: &Header) -> String {
     let start = start(scene, "a random start, seed");
     let first = match header.from_step {
         0 => String::new(),
-        step => format!(" The recording begins with step {step}."),
+        step => format!(
+            " The recording begins with step {step}{}.",
+            if header.legs.is_empty() {
+                ""
+            } else {
+                ", to which another threshold, minimiser or form of the forces led"
+            }
+        ),
     };
     let mut parts = vec![format!(
         "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \

@@ -24,7 +24,7 @@ use super::pictures::Network;
 use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
-use super::{FORMAT_VERSION, Header, Outcome, Recorder, Snapshot, Written};
+use super::{FORMAT_VERSION, Header, Outcome, Recorder, Snapshot, Written, legs_to_text};
 use crate::contact::FrameContacts;
 use crate::droplet::contour::Contours;
 use crate::frame::Frame;
@@ -131,8 +131,9 @@ impl<W: Write> McapRecorder<W> {
             ("scene_digest", hex(header.scene.digest())),
             ("from_step", header.from_step.to_string()),
         ];
+        let legs = legs_to_text(&header.legs)?.map(|legs| ("legs", legs));
         writer
-            .write_metadata(&metadata(ABOUT, about))
+            .write_metadata(&metadata(ABOUT, about.into_iter().chain(legs)))
             .map_err(io_error)?;
         writer
             .attach(&Attachment {

@@ -28,6 +28,7 @@ mod hover;
 mod images;
 mod ipc;
 mod legend;
+mod legs;
 mod live;
 mod mcap;
 mod memory;
@@ -45,12 +46,14 @@ mod states;
 mod writer;
 
 pub use file::{NewFile, abandon_new_files, part_of, same_file};
+pub use legs::Leg;
 pub use live::{Ended, Live, LiveError, Shown, Viewer};
 pub use mcap::McapRecorder;
 pub use rrd::RrdRecorder;
 pub use snapshot::Snapshot;
 pub use writer::{Writer, Written};
 
+pub(crate) use legs::{from_text as legs_from_text, to_text as legs_to_text};
 pub(crate) use snapshot::{Snapshots, nanoseconds};
 
 use crate::packing::Packing;
@@ -84,12 +87,16 @@ pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_V
 /// ```
 #[must_use]
 pub fn recording_id(scene: &Scene) -> String {
-    id_of(scene.digest())
+    id_of(scene.digest(), None)
 }
 
-/// The id of a recording of a scene whose text has this BLAKE3.
-pub(crate) fn id_of(digest: [u8; 32]) -> String {
-    blake3::Hash::from_bytes(digest).to_hex()[..32].to_owned()
+/// The id of a recording of a scene whose text has this BLAKE3, after these [legs](Leg).
+pub(crate) fn id_of(digest: [u8; 32], legs: Option<&str>) -> String {
+    let scene = blake3::Hash::from_bytes(digest).to_hex();
+    match legs {
+        None => scene[..32].to_owned(),
+        Some(legs) => blake3::hash(format!("{scene}{legs}").as_bytes()).to_hex()[..32].to_owned(),
+    }
 }
 
 /// What a recording says of itself before its first frame.
@@ -109,6 +116,8 @@ pub struct Header {
     pub packing: Packing,
     /// The step of the first frame; not 0 if the run goes on from another recording.
     pub from_step: u64,
+    /// How its run came to that step, where not as a run of its scene would; empty otherwise.
+    pub legs: Vec<Leg>,
     /// The program that writes the recording, as `softjam 0.3.0`.
     pub program: String,
     /// The [revision of the bits](crate::BITS) that its states were computed with.
@@ -125,6 +134,7 @@ impl Header {
             scene: scene.clone(),
             packing: run.packing().clone(),
             from_step: run.step(),
+            legs: Vec::new(),
             program: PROGRAM.to_owned(),
             bits: crate::BITS,
         }

@@ -27,7 +27,7 @@ use super::encode::Encoder;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::ImageRows;
 use super::rows::{Batch, MetricRow, Rows};
-use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, recording_id};
+use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, id_of, legs_to_text};
 use crate::force::METRICS;
 use rerun::external::arrow::array::{
     BooleanArray, Float64Array, StringArray, UInt8Array, UInt64Array,
@@ -78,7 +78,8 @@ impl<W: Write> RrdRecorder<W> {
     ///
     /// See the example of [`RrdRecorder`].
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
-        let recording = recording_id(&header.scene);
+        let legs = legs_to_text(&header.legs)?;
+        let recording = id_of(header.scene.digest(), legs.as_deref());
         Self::start(Encoder::new(sink)?, header, &recording)
     }
 
@@ -91,6 +92,7 @@ impl<W: Write> RrdRecorder<W> {
         blueprint::write(&mut encoder, recording)?;
         let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
         encoder.open(&store)?;
+        encoder.number_from(header.from_step);
         header::write(&mut encoder, &store, &header)?;
         Ok(Self {
             rows: Rows::new(header),

@@ -25,6 +25,7 @@ pub mod newton;
 mod present;
 mod stability;
 mod status;
+mod take_over;
 
 pub use stability::Stability;
 pub use status::{RelaxError, Status};

@@ -229,7 +229,8 @@ pub(super) fn each_segment(
     let (mut last, mut goes_on) = (None, true);
     let mut next = recording.next_state()?;
     while let Some(state) = next.take() {
-        if last.is_none() {
+        let first = last.is_none();
+        if first {
             recording.check_run(&state.frame)?;
         }
         watch(&state);
@@ -244,6 +245,11 @@ pub(super) fn each_segment(
                 from: last.replace(state.frame.clone()),
                 to: state.frame,
                 packing: state.packing,
+                legs: if first {
+                    recording.legs().to_vec()
+                } else {
+                    Vec::new()
+                },
                 rows: state.metrics,
                 end,
             })?;
@@ -292,7 +298,8 @@ fn run_whole(
     })?;
     if let Some(run) = &mut run {
         go_on_behind(recording, scene, end, run, &mut snapshots, &mut ledger)?;
-        verdict.run = run.step() - began;
+        let scene = verdict.origin == Origin::Scene;
+        verdict.run = run.step() - if scene { 0 } else { began };
     }
     Ok((ledger, end))
 }

@@ -12,6 +12,7 @@ mod bytes;
 mod compare;
 mod determinism;
 mod difference;
+mod joined;
 mod ledger;
 mod mcap;
 mod recording;
@@ -36,7 +37,7 @@ pub(crate) use source::guarded;
 use crate::frame::{Frame, FrameError};
 use crate::record::Outcome;
 use crate::scene::SceneError;
-use crate::text::shown;
+use crate::text::{lines, shown};
 
 /// Something that a recording holds behind its header.
 ///
@@ -200,6 +201,14 @@ pub enum ReadError {
         path: String,
         /// The last recorded state of the first.
         intact: Option<u64>,
+    },
+    /// It is not the next part of the run that the ones before it are of.
+    #[error("{} cannot be joined: {}", shown(.path), lines(.problem))]
+    Join {
+        /// Path of the file.
+        path: String,
+        /// What it and the parts before it do not agree on.
+        problem: String,
     },
     /// States are missing or out of order.
     #[error("{}: {}; {}", shown(.path), shown(.problem), intact_up_to(*intact))]

@@ -14,7 +14,7 @@ use crate::domain::{Domain, Vec2};
 use crate::force::METRICS;
 use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
-use crate::record::{Format, Outcome, PROGRAM};
+use crate::record::{Format, Leg, Outcome, PROGRAM};
 use crate::scene::{Minimizer, Scene};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
@@ -202,8 +202,19 @@ impl Recording {
             }
         };
         header.check(name)?;
-        Ok(Self {
-            path: name.to_owned(),
+        Ok(Self::of(name.to_owned(), format, source, header, budget))
+    }
+
+    /// A recording whose header has been read.
+    pub(super) fn of(
+        path: String,
+        format: Format,
+        source: Box<dyn Source>,
+        header: Header,
+        budget: Budget,
+    ) -> Self {
+        Self {
+            path,
             format,
             source,
             steps: Steps {
@@ -219,7 +230,17 @@ impl Recording {
             ended: false,
             metrics: Metrics::new(),
             budget,
-        })
+        }
+    }
+
+    /// What the file says of itself.
+    pub(super) fn source_header(&self) -> Header {
+        self.header.clone()
+    }
+
+    /// What the file may take.
+    pub(super) fn budget(&self) -> Budget {
+        self.budget
     }
 
     /// The next recorded state; `None` at the end.
@@ -346,6 +367,7 @@ impl Recording {
             scene: self.header.scene.clone(),
             packing,
             from_step: self.header.from_step,
+            legs: self.header.legs.clone(),
             program: self.header.program.clone(),
             bits: self.header.bits,
         })
@@ -357,6 +379,14 @@ impl Recording {
     #[must_use]
     pub fn from_step(&self) -> u64 {
         self.header.from_step
+    }
+
+    /// How the run came to its first step, where not as a run of the scene would: what it went by before, in order.
+    ///
+    /// See the example of [`Recording`].
+    #[must_use]
+    pub fn legs(&self) -> &[Leg] {
+        &self.header.legs
     }
 
     /// The name of the file.
@@ -586,6 +616,7 @@ impl Iterator for Recording {
                     path: self.path.clone(),
                     intact: self.steps.last,
                 },
+                Problem::Other(error) => error,
             }));
         }
     }

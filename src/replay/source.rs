@@ -5,7 +5,7 @@ use crate::budget::Exceeded;
 use crate::domain::Domain;
 use crate::frame::Frame;
 use crate::packing::coverage;
-use crate::record::{FORMAT_VERSION, Outcome};
+use crate::record::{FORMAT_VERSION, Leg, Outcome};
 use crate::scene::{Scene, SceneFields};
 use crate::text::shown;
 use std::cell::Cell;
@@ -48,6 +48,8 @@ pub(super) enum Problem {
     Budget(String),
     /// Another recording follows in the same file.
     Several,
+    /// It is told already.
+    Other(ReadError),
 }
 
 impl Problem {
@@ -58,6 +60,7 @@ impl Problem {
             Self::Damage(problem) => damaged(problem),
             Self::Budget(problem) => ReadError::Budget { path, problem },
             Self::Several => ReadError::Several { path, intact: None },
+            Self::Other(error) => error,
         }
     }
 }
@@ -84,6 +87,7 @@ pub(super) enum Ending {
 }
 
 /// What a file says of itself before its first frame.
+#[derive(Clone)]
 pub(super) struct Header {
     pub scene: Scene,
     pub radii: Vec<f64>,
@@ -93,6 +97,8 @@ pub(super) struct Header {
     pub bits: u32,
     /// The step that the recording begins with; not 0 if its run went on from another recording.
     pub from_step: u64,
+    /// How its run came to that step, where not as a run of its scene would.
+    pub legs: Vec<Leg>,
 }
 
 impl Header {

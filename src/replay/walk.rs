@@ -4,7 +4,7 @@ use super::Metrics;
 use super::difference::{self, Difference, What};
 use crate::frame::Frame;
 use crate::packing::Packing;
-use crate::record::{Outcome, Snapshot, Snapshots};
+use crate::record::{Leg, Outcome, Snapshot, Snapshots};
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::{Scene, Schedule};
 use std::sync::Arc;
@@ -16,6 +16,8 @@ pub(super) struct Segment {
     /// The state at its end, and the packing at it.
     pub to: Frame,
     pub packing: Packing,
+    /// What the run went by before the first; empty for the others.
+    pub legs: Vec<Leg>,
     /// Metrics that the file has on the way, and late ones.
     pub rows: Metrics,
     /// How the file ends behind it, if it does.
@@ -36,7 +38,7 @@ impl Segment {
     pub fn run(&self, scene: &Scene) -> Result<Result<Relaxation, Difference>, RelaxError> {
         match &self.from {
             Some(from) => Relaxation::resume(scene, self.packing.clone(), from.clone()).map(Ok),
-            None => first_run(scene, &self.to, &self.packing),
+            None => first_run(scene, &self.legs, &self.to, &self.packing),
         }
     }
 
@@ -134,6 +136,7 @@ fn ended(run: &Relaxation) -> Option<Difference> {
 /// A start from a file is what the first frame recorded of it; the file itself need not be at hand.
 fn first_run(
     scene: &Scene,
+    legs: &[Leg],
     first: &Frame,
     recorded: &Packing,
 ) -> Result<Result<Relaxation, Difference>, RelaxError> {
@@ -151,7 +154,8 @@ fn first_run(
     if let Some(what) = count {
         return Ok(Err(Difference { step, what }));
     }
-    let run = Relaxation::new(scene)?;
+    let mut scenes = legs.iter().map(|leg| leg.scene(scene));
+    let mut run = Relaxation::new(&scenes.next().unwrap_or(scene.clone()))?;
     let numbers = |packing: &Packing| {
         let l = packing.domain().lengths();
         let mut numbers = vec![l.x, l.y];
@@ -164,5 +168,18 @@ fn first_run(
         1 => "L_y of the box".to_owned(),
         _ => format!("radius of particle {}", k - 2),
     });
-    Ok(what.map_or(Ok(run), |what| Err(Difference { step, what })))
+    if let Some(what) = what {
+        return Ok(Err(Difference { step, what }));
+    }
+    for leg in legs {
+        while run.step() < leg.until {
+            if let Some(end) = ended(&run) {
+                return Ok(Err(end));
+            }
+            run.advance()?;
+        }
+        let next = scenes.next().unwrap_or(scene.clone());
+        run = Relaxation::take_over(&next, run.packing().clone(), run.frame())?;
+    }
+    Ok(Ok(run))
 }

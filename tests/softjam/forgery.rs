@@ -5,9 +5,9 @@ use crate::common::Random;
 use crate::files::{FORMATS, open, recorder};
 use softjam::domain::Vec2;
 use softjam::force::{Form, METRICS};
-use softjam::record::{Format, Header, Outcome, Snapshot};
+use softjam::record::{Format, Header, Leg, Outcome, Snapshot};
 use softjam::relax::{Relaxation, Stability, Status};
-use softjam::replay::{Balance, Bytes, Way, determinism};
+use softjam::replay::{Balance, Bytes, Event, Recording, Way, determinism};
 use softjam::scene::{Minimizer, Scene, Schedule};
 use std::io::Cursor;
 
@@ -228,7 +228,7 @@ fn result(run: &mut Run, change: impl Fn(&mut Outcome)) {
 }
 
 /// What is forged of the scene that the recording claims to be of.
-const SCENE: [(&str, Forge); 14] = [
+const SCENE: [(&str, Forge); 15] = [
     ("seed", |run, random| {
         run.header.scene.seed += 1 + random.below(9) as u64;
     }),
@@ -265,6 +265,15 @@ const SCENE: [(&str, Forge); 14] = [
     }),
     ("first step", |run, random| {
         run.header.from_step = 1 + random.below(20) as u64;
+    }),
+    ("another scene before", |run, random| {
+        let gradient = Scene {
+            forces: Form::Gradient,
+            ..scene()
+        };
+        run.snapshots.retain(|s| s.step >= 20);
+        run.header.from_step = 20;
+        run.header.legs = vec![Leg::of(&gradient, 1 + random.below(19) as u64)];
     }),
 ];
 
@@ -342,4 +351,71 @@ fn another_revision_of_the_bits_is_compared_within_tolerances() {
         let worst = found.deviation.expect("another revision");
         assert_eq!(worst.agrees(), agrees, "{off:e}: {worst:?}");
     }
+}
+
+/// Two parts of one run, the second one forged.
+fn joined(forge: impl FnOnce(&mut Run)) -> Result<usize, String> {
+    let whole = Run::honest();
+    let mut rest = Run::honest();
+    rest.snapshots.retain(|s| s.step >= 20);
+    rest.header.from_step = 20;
+    forge(&mut rest);
+    let parts = [whole, rest].map(|run| {
+        let bytes = run.write(Format::Rrd).expect("a recording");
+        open(&bytes).expect("a header")
+    });
+    let whole = Recording::joined(parts.into()).map_err(|error| error.to_string())?;
+    let states = whole.filter_map(|event| match event {
+        Ok(Event::State(_)) => Some(Ok(())),
+        Ok(_) => None,
+        Err(error) => Some(Err(error.to_string())),
+    });
+    Ok(states.collect::<Result<Vec<()>, _>>()?.len())
+}
+
+#[test]
+fn parts_whose_common_steps_differ_by_a_bit_are_not_of_one_run() {
+    let honest = Run::honest();
+    let states = honest.snapshots.iter().filter(|s| s.state).count();
+    assert_eq!(joined(|_| {}), Ok(states));
+    let at = |run: &mut Run, step: u64| {
+        run.snapshots
+            .iter()
+            .position(|s| s.step == step)
+            .expect("it")
+    };
+    let error = joined(|run| {
+        let k = at(run, 30);
+        let frame = run.snapshots[k].frame.as_mut().expect("a frame");
+        frame.positions[3].x = frame.positions[3].x.next_up();
+    });
+    let said = error.expect_err("found");
+    assert!(
+        said.contains("its state of step 30 is not that of test"),
+        "{said}"
+    );
+    let error = joined(|run| {
+        let k = at(run, 31);
+        let metrics = run.snapshots[k].metrics.as_mut().expect("metrics");
+        metrics[3] = metrics[3].next_up();
+    });
+    let said = error.expect_err("found");
+    assert!(
+        said.contains("its pressure of step 31 is not that of test"),
+        "{said}"
+    );
+    let error = joined(|run| run.header.bits += 1);
+    assert!(error.expect_err("found").contains("computed with bits 2"));
+    let error = joined(|run| {
+        let k = at(run, 20);
+        run.snapshots[k].metrics = None;
+        run.snapshots[k].step = 17;
+        run.snapshots[k].frame.as_mut().expect("a frame").step = 17;
+        run.header.from_step = 17;
+    });
+    let said = error.expect_err("found");
+    assert!(
+        said.contains("begins with step 17, of which test holds no state"),
+        "{said}"
+    );
 }

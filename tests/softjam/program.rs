@@ -5,6 +5,7 @@ mod convert;
 mod files;
 mod help;
 mod live;
+mod parts;
 mod replay;
 mod strangers;
 

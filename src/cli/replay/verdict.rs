@@ -4,7 +4,7 @@ use super::progress::Progress;
 use super::{Arguments, Question};
 use crate::cli::lines::Lines;
 use softjam::BITS;
-use softjam::record::{Outcome, PROGRAM};
+use softjam::record::{Leg, Outcome, PROGRAM};
 use softjam::replay::{
     Balance, Bytes, Determinism, Origin, Recording, ReplayError, State, Way, Worst, determinism,
     place_of_byte,
@@ -23,6 +23,7 @@ pub(super) struct Findings {
     pub closed: bool,
     last: Option<u64>,
     from_step: u64,
+    legs: Vec<Leg>,
     program: String,
     bits: u32,
     /// Whether this program gives the recorded bits.
@@ -112,6 +113,7 @@ pub(super) fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
         closed: recording.is_closed(),
         last: recording.intact(),
         from_step: recording.from_step(),
+        legs: recording.legs().to_vec(),
         program: recording.program().to_owned(),
         bits: recording.bits(),
         same_bits: recording.has_same_bits(),
@@ -214,6 +216,14 @@ impl Findings {
             Origin::Positions => "the scene run again from the first recorded positions",
             Origin::Frame => "the scene run again from the first recorded state",
         };
+        let legs = self.legs.iter().filter(|_| d.origin == Origin::Scene);
+        let legs: String = legs
+            .map(|leg| {
+                let (until, threshold) = (leg.until, leg.threshold);
+                format!(" (to step {until} with the threshold {threshold:e}, the minimiser and the forces of before)")
+            })
+            .collect();
+        let begin = format!("{begin}{legs}");
         if nothing_was_run(d) {
             not.push("anything of the run: no step leads to the only recorded state".to_owned());
             return;

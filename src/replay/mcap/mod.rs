@@ -8,10 +8,10 @@ use crate::budget::Budget;
 use crate::domain::{Domain, Vec2};
 use crate::force::METRICS;
 use crate::frame::Frame;
-use crate::record::Outcome;
 use crate::record::messages::{
     ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage, topic,
 };
+use crate::record::{Leg, Outcome, legs_from_text};
 use crate::relax::Stability;
 use crate::relax::fire::FireState;
 use crate::scene::Scene;
@@ -62,6 +62,7 @@ struct About {
     scene_digest: String,
     bits: u32,
     from_step: u64,
+    legs: Vec<Leg>,
 }
 
 impl McapSource {
@@ -97,6 +98,7 @@ impl McapSource {
                     program: about.program.clone(),
                     bits: about.bits,
                     from_step: about.from_step,
+                    legs: about.legs.clone(),
                 };
                 let source = Self {
                     stream,
@@ -156,11 +158,19 @@ fn read_about(path: &str, metadata: &BTreeMap<String, String>) -> Result<Option<
         return Ok(None);
     };
     check_version(path, version)?;
+    let from_step = text("from_step").parse().unwrap_or(0);
+    let legs = metadata.get("legs");
+    let legs = legs.map_or(Ok(Vec::new()), |legs| legs_from_text(legs, from_step));
     Ok(Some(About {
         program: shown(&text("program")),
         scene_digest: text("scene_digest"),
         bits: text("bits").parse().unwrap_or(1),
-        from_step: text("from_step").parse().unwrap_or(0),
+        from_step,
+        legs: legs.map_err(|problem| ReadError::Format {
+            path: path.to_owned(),
+            format: "an MCAP file",
+            problem,
+        })?,
     }))
 }
 

@@ -3,7 +3,7 @@
 use super::not_rrd;
 use super::stream::{Message, Stream};
 use crate::domain::Domain;
-use crate::record::id_of;
+use crate::record::{Leg, id_of, legs_from_text};
 use crate::replay::ReadError;
 use crate::replay::source::{Header, check_version, guarded, particles, read_scene};
 use crate::scene::Scene;
@@ -19,6 +19,7 @@ struct About {
     program: String,
     bits: u32,
     from_step: u64,
+    legs: Vec<Leg>,
 }
 
 /// Reads messages until scene and radii are known.
@@ -51,6 +52,7 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
                     program,
                     bits,
                     from_step,
+                    legs,
                 } = about.ok_or(missing("scene"))?;
                 if store.recording_id().as_str() != id {
                     return Err(ReadError::Changed {
@@ -68,6 +70,7 @@ pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header),
                     program,
                     bits,
                     from_step,
+                    legs,
                 };
                 return Ok((store, header));
             }
@@ -100,16 +103,19 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
     };
     let (scene, digest) = read_scene(path, &toml)?;
     let mut from_steps = chunk.iter_slices::<u64>("softjam.Scene:from_step".into());
+    let from_step = from_steps.next().and_then(|l| l.first().copied());
+    let from_step = from_step.unwrap_or(0);
+    let legs = text("softjam.Scene:legs");
     let mut bits = chunk.iter_slices::<u32>("softjam.Scene:bits".into());
     Ok(Some(About {
         scene,
-        id: id_of(digest),
+        id: id_of(digest, legs.as_deref()),
         program: shown(&text("softjam.Scene:program").unwrap_or_default()),
         bits: bits.next().and_then(|l| l.first().copied()).unwrap_or(1),
-        from_step: from_steps
-            .next()
-            .and_then(|l| l.first().copied())
-            .unwrap_or(0),
+        from_step,
+        legs: legs
+            .map_or(Ok(Vec::new()), |legs| legs_from_text(&legs, from_step))
+            .map_err(|problem| not_rrd(path, problem))?,
     }))
 }
 

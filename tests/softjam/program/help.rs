@@ -3,8 +3,8 @@
 use super::{folder, run};
 use softjam::scene::Scene;
 
-const VERBS: [&str; 7] = [
-    "record", "replay", "info", "convert", "figure", "manual", "scene",
+const VERBS: [&str; 8] = [
+    "record", "replay", "info", "convert", "join", "figure", "manual", "scene",
 ];
 
 fn help(verb: &str) -> String {
