@@ -5,6 +5,7 @@
 
 use super::walk::End;
 use crate::record::{Format, Header, McapRecorder, Outcome, Recorder, RrdRecorder, Snapshot};
+use std::cell::Cell;
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -23,6 +24,9 @@ const FEW: u64 = 8;
 /// Bytes that are compared before it may end so.
 const ENOUGH: u64 = 1 << 16;
 
+/// Flipped bits change fewer bytes than a program that writes the file anew, if only its headers.
+const DAMAGE: u64 = 64;
+
 /// What a comparison of bytes came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Compared {
@@ -40,6 +44,11 @@ impl Compared {
     /// Whether so much differs that the file is not the run's with some bytes changed, but laid out otherwise.
     pub fn is_laid_out_otherwise(&self) -> bool {
         self.differing * FEW > self.bytes
+    }
+
+    /// Whether more differs than flipped bits do, of which one may say that another program wrote the file.
+    pub fn is_rewritten(&self) -> bool {
+        self.differing > DAMAGE
     }
 }
 
@@ -106,15 +115,17 @@ fn compare(
     messages: &Receiver<Message>,
 ) -> Compared {
     let mut compared = Compared::default();
+    let over = Cell::new(false);
     let sink = Sink {
         file: &mut file,
         compared: &mut compared,
         theirs: Vec::new(),
+        over: &over,
     };
     // A sink fails only where enough was seen.
     let whole = match format {
-        Format::Rrd => RrdRecorder::new(sink, header).and_then(|r| record(r, messages)),
-        Format::Mcap => McapRecorder::new(sink, header).and_then(|r| record(r, messages)),
+        Format::Rrd => RrdRecorder::new(sink, header).and_then(|r| record(r, messages, &over)),
+        Format::Mcap => McapRecorder::new(sink, header).and_then(|r| record(r, messages, &over)),
     };
     compared.ended = matches!(whole, Ok(true));
     if compared.ended && !matches!(file.read(&mut [0]), Ok(0)) {
@@ -124,7 +135,11 @@ fn compare(
 }
 
 /// Records until the queue ends; whether that was the end of the file, too.
-fn record(mut recorder: impl Recorder, messages: &Receiver<Message>) -> io::Result<bool> {
+fn record(
+    mut recorder: impl Recorder,
+    messages: &Receiver<Message>,
+    over: &Cell<bool>,
+) -> io::Result<bool> {
     while let Ok(message) = messages.recv() {
         match message {
             Message::Snapshots(snapshots) => {
@@ -138,6 +153,8 @@ fn record(mut recorder: impl Recorder, messages: &Receiver<Message>) -> io::Resu
             }
         }
     }
+    // A recorder of MCAP that is dropped closes its file, which this one is not.
+    over.set(true);
     Ok(false)
 }
 
@@ -146,10 +163,15 @@ struct Sink<'a> {
     file: &'a mut Box<dyn Read + Send>,
     compared: &'a mut Compared,
     theirs: Vec<u8>,
+    /// Whether what still comes is no part of the file.
+    over: &'a Cell<bool>,
 }
 
 impl Write for Sink<'_> {
     fn write(&mut self, ours: &[u8]) -> io::Result<usize> {
+        if self.over.get() {
+            return Err(io::Error::other("the file is over"));
+        }
         self.theirs.clear();
         let length = ours.len() as u64;
         self.file

@@ -13,7 +13,7 @@ use super::tolerance;
 use super::turns::run_segments;
 use super::walk::{End, Segment};
 use super::{ReadError, Recording, State};
-use crate::record::Snapshots;
+use crate::record::{PROGRAM, Snapshots};
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::Scene;
 use crate::text::shown;
@@ -208,13 +208,16 @@ fn conclude(recording: &mut Recording, mut ledger: Ledger, end: End, verdict: &m
     let Some(compared) = compared.filter(|_| verdict.difference.is_none()) else {
         return;
     };
+    let otherwise = if recording.is_laid_out_by_softjam() {
+        recording.program() != PROGRAM && compared.is_laid_out_otherwise()
+    } else {
+        compared.is_rewritten()
+    };
     verdict.bytes = match compared.first {
         None if compared.ended => Bytes::Same(compared.bytes),
         // What the file lacks at its end is no difference.
         _ if !end.closed && compared.differing == 0 => Bytes::SameUpTo(compared.bytes),
-        Some(at) if !(recording.is_laid_out_otherwise() && compared.is_laid_out_otherwise()) => {
-            Bytes::Differ { at }
-        }
+        Some(at) if !otherwise => Bytes::Differ { at },
         _ => Bytes::LaidOutOtherwise,
     };
 }

@@ -264,22 +264,19 @@ impl Joined {
             self.hand_out(frame, items);
         }
         self.before = Some((part.path().to_owned(), part.intact()));
-        match self.parts.front().map(Recording::from_step) {
-            Some(next) => {
-                self.held.states = self.held.states.split_off(&next);
-                self.held.metrics = self.held.metrics.split_off(&(next, ""));
-            }
-            None => {
-                let closed = self.outcome.is_some() || part.is_closed();
-                self.ending = Some(if closed {
-                    Ending::Closed
-                } else {
-                    Ending::BreaksOff
-                });
-                if let Some(outcome) = self.outcome {
-                    items.push(Item::Result(outcome, *self.digests.finalize().as_bytes()));
-                }
-            }
+        if let Some(next) = self.parts.front().map(Recording::from_step) {
+            self.held.states = self.held.states.split_off(&next);
+            self.held.metrics = self.held.metrics.split_off(&(next, ""));
+            return;
+        }
+        let closed = self.outcome.is_some() || part.is_closed();
+        self.ending = Some(if closed {
+            Ending::Closed
+        } else {
+            Ending::BreaksOff
+        });
+        if let Some(outcome) = self.outcome {
+            items.push(Item::Result(outcome, *self.digests.finalize().as_bytes()));
         }
     }
 }

@@ -18,6 +18,7 @@ mod mcap;
 mod recording;
 mod rrd;
 mod source;
+mod standing;
 mod steps;
 mod tolerance;
 mod turns;
@@ -30,6 +31,7 @@ pub use difference::{Difference, Row, What, ulps};
 pub use recording::place_of_byte;
 pub use recording::{Metrics, Recording, State};
 pub use source::reading_damaged_bytes;
+pub use standing::Standing;
 
 #[cfg(feature = "figure")]
 pub(crate) use source::guarded;
@@ -139,7 +141,7 @@ pub enum ReadError {
     },
     /// The recording was made of another scene than the one it names.
     #[error(
-        "the scene in {} was changed after it was recorded: the recording is {}, its scene makes {}",
+        "the scene in {} was changed after it was recorded, or its recording was given another's name: it is {}, its scene makes {}",
         shown(.path),
         shown(.found),
         shown(.expected)
@@ -195,12 +197,34 @@ pub enum ReadError {
         intact: Option<u64>,
     },
     /// The file holds more than one recording.
-    #[error("{} holds several recordings, one behind the other; {}", shown(.path), intact_up_to(*intact))]
+    #[error("{} holds several recordings; {}", shown(.path), intact_up_to(*intact))]
     Several {
         /// Path of the file.
         path: String,
         /// The last recorded state of the first.
         intact: Option<u64>,
+    },
+    /// The file holds several parts of one run, put together by another program.
+    #[error(
+        "{} holds several parts of one run, put together by another program, which may have lost some of their rows: give the files \
+         that it was made of to `softjam join`; {}",
+        shown(.path),
+        intact_up_to(*intact)
+    )]
+    Parts {
+        /// Path of the file.
+        path: String,
+        /// The last recorded state of the first.
+        intact: Option<u64>,
+    },
+    /// The file is a piece that was cut out of a recording.
+    #[error(
+        "{} is a piece of a recording, as `rerun rrd split` makes them: take the recording as a whole",
+        shown(.path)
+    )]
+    Piece {
+        /// Path of the file.
+        path: String,
     },
     /// It is not the next part of the run that the ones before it are of.
     #[error("{} cannot be joined: {}", shown(.path), lines(.problem))]

@@ -5,6 +5,7 @@ mod limits;
 use super::mcap::McapSource;
 use super::rrd::RrdSource;
 use super::source::{Ending, Header, Item, Problem, Source};
+use super::standing::Standing;
 use super::steps::Steps;
 use super::walk::End;
 use super::{Event, ReadError, mcap, rrd};
@@ -14,7 +15,7 @@ use crate::domain::{Domain, Vec2};
 use crate::force::METRICS;
 use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
-use crate::record::{Format, Leg, Outcome, PROGRAM};
+use crate::record::{Format, Leg, Outcome};
 use crate::scene::{Minimizer, Scene};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
@@ -413,6 +414,28 @@ impl Recording {
         self.source.ending() == Some(Ending::Closed)
     }
 
+    /// How the run stood at the end of the file. Known when the end is reached.
+    ///
+    /// ```
+    /// use softjam::replay::{Recording, Standing};
+    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # let path = std::env::temp_dir().join("softjam-standing-example.rrd");
+    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+    /// # let mut run = Relaxation::new(&scene).unwrap();
+    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
+    /// # record::record(&mut run, vec![writer], &scene.channels, |run| run.step() < 9).unwrap();
+    ///
+    /// let mut recording = Recording::open(&path).unwrap();
+    /// recording.by_ref().for_each(drop);
+    /// assert_eq!(recording.standing(), Standing::Interrupted);
+    /// # std::fs::remove_file(&path).unwrap();
+    /// ```
+    #[must_use]
+    pub fn standing(&self) -> Standing {
+        let converged = self.outcome.map(|end| end.converged);
+        Standing::of(self.is_closed(), self.source.is_of_softjam(), converged)
+    }
+
     /// The last step whose state has been read in full.
     ///
     /// See the example of [`Recording`].
@@ -440,11 +463,6 @@ impl Recording {
     #[must_use]
     pub fn is_laid_out_by_softjam(&self) -> bool {
         self.source.is_of_softjam()
-    }
-
-    /// Whether the file does not claim to be as this version writes it: another program, or another version, wrote it.
-    pub(super) fn is_laid_out_otherwise(&self) -> bool {
-        !self.source.is_of_softjam() || self.header.program != PROGRAM
     }
 
     /// How the run ended, as far as it has been read.
@@ -514,19 +532,40 @@ impl Recording {
                 intact,
             });
         }
-        self.steps
-            .accept(step)
-            .map_err(|problem| ReadError::Steps {
+        if let Err(problem) = self.steps.accept(step) {
+            return Err(ReadError::Steps {
                 path: self.path.clone(),
-                problem,
+                problem: self.steps_behind(step).unwrap_or(problem),
                 intact,
-            })?;
+            });
+        }
         self.steps.last = Some(step);
         self.digests.update(digest);
         Ok(Event::State(frame))
     }
 
+    /// What a look at the rest of the file tells of a state that is not the next, the one of `step`.
+    fn steps_behind(&mut self, step: u64) -> Option<String> {
+        let (mut steps, mut items) = (vec![step], Vec::new());
+        // Whatever is wrong there, it is not the first that is.
+        while let Ok(true) = self.source.read_on(&mut items) {
+            steps.extend(items.drain(..).filter_map(|item| match item {
+                Item::State(frame, _) => Some(frame.step),
+                _ => None,
+            }));
+        }
+        self.steps.order_behind(steps)
+    }
+
     fn check_result(&mut self, outcome: Outcome, digest: [u8; 32]) -> Result<Event, ReadError> {
+        if self.steps.last.is_none() && self.header.scene.channels.state.is_on() {
+            return Err(ReadError::Steps {
+                path: self.path.clone(),
+                problem: "its scene records states, and it holds none: they were taken out of it"
+                    .to_owned(),
+                intact: None,
+            });
+        }
         let wrong = |problem: String| ReadError::Result {
             path: self.path.clone(),
             problem,
@@ -613,6 +652,10 @@ impl Iterator for Recording {
                     problem,
                 },
                 Problem::Several => ReadError::Several {
+                    path: self.path.clone(),
+                    intact: self.steps.last,
+                },
+                Problem::Parts => ReadError::Parts {
                     path: self.path.clone(),
                     intact: self.steps.last,
                 },

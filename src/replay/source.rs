@@ -48,6 +48,8 @@ pub(super) enum Problem {
     Budget(String),
     /// Another recording follows in the same file.
     Several,
+    /// Another part of the same run follows in the same file.
+    Parts,
     /// It is told already.
     Other(ReadError),
 }
@@ -60,6 +62,7 @@ impl Problem {
             Self::Damage(problem) => damaged(problem),
             Self::Budget(problem) => ReadError::Budget { path, problem },
             Self::Several => ReadError::Several { path, intact: None },
+            Self::Parts => ReadError::Parts { path, intact: None },
             Self::Other(error) => error,
         }
     }

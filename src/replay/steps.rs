@@ -35,4 +35,39 @@ impl Steps {
         self.off_schedule = expected != Some(step);
         Ok(())
     }
+
+    /// What is wrong with the order, by the steps of all states behind the last that was accepted; nothing if some are missing.
+    pub fn order_behind(&self, mut steps: Vec<u64>) -> Option<String> {
+        let (first, begins) = (steps.first().copied()?, self.first);
+        let out_of_order = match self.last {
+            Some(last) => format!("its states are out of order: step {first} follows step {last}"),
+            None => {
+                format!(
+                    "its states are out of order: the first is that of step {first}, not {begins}"
+                )
+            }
+        };
+        steps.sort_unstable();
+        let all = steps.len();
+        steps.dedup();
+        let end = *steps.last()?;
+        let mut expected = self
+            .last
+            .map_or(Some(begins), |last| self.schedule.after(last));
+        while let Some(step) = expected.filter(|step| *step < end) {
+            steps.binary_search(&step).ok()?;
+            expected = self.schedule.after(step);
+        }
+        let seen = |step: &u64| self.last.is_some_and(|last| *step <= last);
+        let twice = steps.len() < all || steps.iter().any(seen);
+        Some(if twice {
+            format!(
+                "it holds several parts of one run, states of some steps more than once ({first} follows {}): give the files that it was \
+                 made of to `softjam join`",
+                self.last.unwrap_or(begins)
+            )
+        } else {
+            out_of_order
+        })
+    }
 }

@@ -32,6 +32,8 @@ mod physics;
 #[cfg(feature = "cli")]
 mod program;
 #[cfg(feature = "recording")]
+mod rearranged;
+#[cfg(feature = "recording")]
 mod recording;
 #[cfg(feature = "recording")]
 mod redraw;

@@ -33,6 +33,7 @@ pub(super) struct McapSource {
     of_softjam: bool,
     /// How the run ended. Other writers may put it in front of the states, so it is kept for the end.
     result: Option<Item>,
+    about: About,
 }
 
 /// The topics by their numbers.
@@ -57,12 +58,24 @@ impl Topics {
 }
 
 /// What the metadata record says of the file.
+#[derive(Clone)]
 struct About {
     program: String,
     scene_digest: String,
     bits: u32,
     from_step: u64,
     legs: Vec<Leg>,
+}
+
+impl About {
+    /// What follows where a file says of itself once more what it is.
+    fn another(&self, metadata: &BTreeMap<String, String>) -> Problem {
+        if metadata.get("scene_digest") == Some(&self.scene_digest) {
+            Problem::Parts
+        } else {
+            Problem::Several
+        }
+    }
 }
 
 impl McapSource {
@@ -105,12 +118,16 @@ impl McapSource {
                     topics,
                     of_softjam,
                     result,
+                    about: about.clone(),
                 };
                 return Ok((source, header));
             }
             let record = stream.next();
             match record.map_err(|problem| problem.at_start(path, not_mcap))? {
                 Some(Record::Metadata(data)) if data.name == ABOUT => {
+                    if let Some(about) = &about {
+                        return Err(about.another(&data.metadata).at_start(path, not_mcap));
+                    }
                     about =
                         Some(read_about(path, &data.metadata)?.ok_or(missing("format version"))?);
                 }
@@ -224,7 +241,9 @@ impl Source for McapSource {
                     return Err("it has two results".to_owned().into());
                 }
             }
-            Record::Metadata(data) if data.name == ABOUT => return Err(Problem::Several),
+            Record::Metadata(data) if data.name == ABOUT => {
+                return Err(self.about.another(&data.metadata));
+            }
             _ => {}
         }
         Ok(true)

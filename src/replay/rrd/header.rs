@@ -22,69 +22,119 @@ struct About {
     legs: Vec<Leg>,
 }
 
-/// Reads messages until scene and radii are known.
-pub(super) fn read(path: &str, stream: &mut Stream) -> Result<(StoreId, Header), ReadError> {
-    let missing = |missing| ReadError::NotSoftjam {
-        path: path.to_owned(),
-        missing,
-    };
-    let mut about = None;
+/// Reads messages until scene and radii are known: the store, the id that the scene makes, and the header.
+pub(super) fn read(
+    path: &str,
+    stream: &mut Stream,
+) -> Result<(StoreId, String, Header), ReadError> {
+    let damaged = |problem| not_rrd(path, problem);
+    let (mut about, mut radii): (Option<About>, Option<(Vec<f64>, Domain)>) = (None, None);
+    // Rows in front of scene and radii: the first entity that has some, and their first step.
+    let mut early: Option<(String, u64)> = None;
     loop {
         let message = stream.next();
-        let message =
-            message.map_err(|problem| problem.at_start(path, |damage| not_rrd(path, damage)))?;
+        let message = message.map_err(|problem| problem.at_start(path, damaged))?;
         let Some(message) = message else {
-            return Err(missing(if about.is_some() { "radii" } else { "scene" }));
+            let missing = if about.is_some() { "radii" } else { "scene" };
+            let path = path.to_owned();
+            return Err(ReadError::NotSoftjam { path, missing });
         };
         let Message::Chunk(store, chunk) = message else {
             continue;
         };
-        let damaged = |problem| not_rrd(path, problem);
+        let name = store.recording_id().as_str();
+        let piece = || ReadError::Piece {
+            path: path.to_owned(),
+        };
+        if is_piece(name) {
+            return Err(piece());
+        }
         match chunk.entity_path().to_string().as_str() {
             "/scene" => {
                 let read = guarded(|| Ok(read_about(path, &chunk)));
                 about = read.map_err(damaged)??.or(about);
             }
             "/particles" => {
-                let About {
-                    scene,
-                    id,
-                    program,
-                    bits,
-                    from_step,
-                    legs,
-                } = about.ok_or(missing("scene"))?;
-                if store.recording_id().as_str() != id {
-                    return Err(ReadError::Changed {
-                        path: path.to_owned(),
-                        found: store.recording_id().as_str().to_owned(),
-                        expected: id,
-                    });
-                }
                 let read = guarded(|| Ok(read_particles(&chunk)));
-                let (radii, domain) = read.map_err(damaged)?.map_err(missing)?;
-                let header = Header {
-                    scene,
-                    radii,
-                    domain,
-                    program,
-                    bits,
-                    from_step,
-                    legs,
-                };
-                return Ok((store, header));
+                radii = Some(read.map_err(damaged)?.map_err(|missing| {
+                    // Cut apart, scene and radii come behind and component by component.
+                    if early.is_some() && !is_id(name) {
+                        return piece();
+                    }
+                    let path = path.to_owned();
+                    ReadError::NotSoftjam { path, missing }
+                })?);
             }
             entity
                 if entity == "/state" || entity == "/result" || entity.starts_with("/metrics/") =>
             {
-                return Err(damaged(format!(
-                    "rows of {} stand in front of its scene and radii",
-                    shown(entity)
-                )));
+                let step = super::steps(&chunk).min().unwrap_or(u64::MAX);
+                let (_, first) = early.get_or_insert_with(|| (shown(entity), step));
+                *first = step.min(*first);
             }
             _ => {}
         }
+        let Some(((radii, domain), about)) = radii.clone().zip(about.take_if(|_| radii.is_some()))
+        else {
+            continue;
+        };
+        match early {
+            // Of two headers the later is left.
+            Some((_, first)) if first < about.from_step => {
+                let path = path.to_owned();
+                return Err(ReadError::Parts { path, intact: None });
+            }
+            Some((entity, _)) => {
+                let problem = format!("rows of {entity} stand in front of its scene and radii");
+                return Err(damaged(problem));
+            }
+            // Another program may give it any other name, but not that of another scene.
+            None if name != about.id && is_id(name) => {
+                return Err(ReadError::Changed {
+                    path: path.to_owned(),
+                    found: name.to_owned(),
+                    expected: about.id,
+                });
+            }
+            None => {}
+        }
+        let header = Header {
+            scene: about.scene,
+            radii,
+            domain,
+            program: about.program,
+            bits: about.bits,
+            from_step: about.from_step,
+            legs: about.legs,
+        };
+        return Ok((store, about.id, header));
     }
+}
+
+/// Whether it looks like an id that a scene makes.
+fn is_id(name: &str) -> bool {
+    let hexadecimal = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
+    name.len() == 32 && name.bytes().all(hexadecimal)
+}
+
+/// Whether it looks like the name of a piece of a recording with such an id.
+fn is_piece(name: &str) -> bool {
+    let parts = name.split_once('-');
+    parts.is_some_and(|(id, number)| is_id(id) && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// The id that the scene in a chunk makes, if there is one.
+pub(super) fn scene_id(chunk: &Chunk) -> Option<String> {
+    let is_scene = chunk.entity_path().to_string() == "/scene"
+        && chunk
+            .components()
+            .contains_component("softjam.Scene:toml".into());
+    let read = || guarded(|| Ok(read_about("", chunk)));
+    // One that cannot be read is some other scene.
+    is_scene.then(|| match read() {
+        Ok(Ok(Some(about))) => about.id,
+        _ => String::new(),
+    })
 }
 
 fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {

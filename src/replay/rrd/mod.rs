@@ -26,6 +26,8 @@ pub(super) const MAGIC: &[u8] = &rerun::external::re_log_encoding::rrd::RRD_FOUR
 pub(super) struct RrdSource {
     stream: Stream,
     store: StoreId,
+    /// The id that its scene makes.
+    scene: String,
     budget: Budget,
 }
 
@@ -39,10 +41,11 @@ impl RrdSource {
     ) -> Result<(Self, Header), ReadError> {
         let mut stream =
             Stream::open(source, length, budget).map_err(|problem| not_rrd(path, problem))?;
-        let (store, header) = header::read(path, &mut stream)?;
+        let (store, scene, header) = header::read(path, &mut stream)?;
         let source = Self {
             stream,
             store,
+            scene,
             budget,
         };
         Ok((source, header))
@@ -85,18 +88,41 @@ fn not_rrd(path: &str, problem: String) -> ReadError {
     }
 }
 
+impl RrdSource {
+    /// What follows where another recording is opened: its scene tells.
+    fn another(&mut self) -> Problem {
+        while let Ok(Some(message)) = self.stream.next() {
+            if let Message::Chunk(_, chunk) = message
+                && let Some(scene) = header::scene_id(&chunk)
+            {
+                return self.of_scene(&scene);
+            }
+        }
+        Problem::Several
+    }
+
+    /// What follows if it is of this scene.
+    fn of_scene(&self, scene: &str) -> Problem {
+        if scene == self.scene {
+            Problem::Parts
+        } else {
+            Problem::Several
+        }
+    }
+}
+
 impl Source for RrdSource {
     fn read_on(&mut self, items: &mut Vec<Item>) -> Result<bool, Problem> {
         let Some(message) = self.stream.next()? else {
             return Ok(false);
         };
         match message {
-            Message::Opens => return Err(Problem::Several),
+            Message::Opens => return Err(self.another()),
             Message::Layout => {}
-            Message::Chunk(store, chunk) => {
-                if store != self.store {
-                    let problem = format!("rows of another recording, {}", store.recording_id());
-                    return Err(Problem::Damage(problem));
+            Message::Chunk(store, _) if store != self.store => return Err(Problem::Several),
+            Message::Chunk(_, chunk) => {
+                if let Some(scene) = header::scene_id(&chunk) {
+                    return Err(self.of_scene(&scene));
                 }
                 let size = (chunk.num_rows() * size_of::<Item>()) as u64;
                 self.budget.allow_piece("a message of so many rows", size)?;
@@ -111,7 +137,7 @@ impl Source for RrdSource {
     }
 
     fn is_of_softjam(&self) -> bool {
-        self.stream.is_plain()
+        self.stream.is_plain() && self.store.recording_id().as_str() == self.scene
     }
 }
 
@@ -119,16 +145,14 @@ impl Source for RrdSource {
 fn take_apart(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
     let entity = chunk.entity_path().to_string();
     match entity.as_str() {
-        "/state" => read_states(chunk, items)?,
         // The header has been read: what else is of it is there twice.
         "/particles" => return Err("it has two records of its particles".to_owned()),
-        "/scene"
-            if chunk
-                .components()
-                .contains_component("softjam.Scene:toml".into()) =>
-        {
-            return Err("it has two scenes".to_owned());
+        "/state" | "/metrics/f_max" if chunk.num_rows() > 0 && steps(chunk).next().is_none() => {
+            return Err(format!(
+                "rows of {entity} have no timeline `step`: it was taken out of them"
+            ));
         }
+        "/state" => read_states(chunk, items)?,
         "/result" => items.push(read_result(chunk).ok_or("its result is not whole")?),
         "/world/contours" | "/world/contacts" if !chunk.is_static() => {
             let channel = if entity == "/world/contours" {

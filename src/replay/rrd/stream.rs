@@ -13,8 +13,8 @@ use rerun::external::arrow::ipc::root_as_message;
 use rerun::external::re_log_encoding::ToApplication as _;
 use rerun::external::re_log_encoding::external::lz4_flex;
 use rerun::external::re_log_encoding::rrd::{
-    Compression as StreamCompression, Decodable as _, MessageHeader, MessageKind, StreamFooter,
-    StreamHeader,
+    Compression as StreamCompression, Decodable as _, MessageHeader, MessageKind, RRD_FOURCC,
+    StreamFooter, StreamHeader,
 };
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::log::Chunk;
@@ -110,7 +110,14 @@ impl Stream {
         if matches!(header.kind, MessageKind::End) {
             return Ok(self.close()?);
         }
-        let message = Option::<Msg>::from_rrd_bytes(&self.bytes).map_err(|e| at(e.to_string()))?;
+        let message = Option::<Msg>::from_rrd_bytes(&self.bytes).map_err(|e| {
+            let begins = |bytes: &[u8]| bytes == RRD_FOURCC;
+            at(if self.bytes.windows(RRD_FOURCC.len()).any(begins) {
+                "it breaks off, and another file follows: several files in one?".to_owned()
+            } else {
+                e.to_string()
+            })
+        })?;
         match message {
             Some(Msg::ArrowMsg(mut arrow)) => {
                 let store = arrow.store_id.clone();
