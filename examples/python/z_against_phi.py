@@ -22,8 +22,10 @@ arguments = parser.parse_args()
 
 samples = {}
 for path in arguments.recordings:
-    text = subprocess.run([arguments.softjam, "info", path, "--json"], check=True, capture_output=True).stdout
-    info = json.loads(text)
+    found = subprocess.run([arguments.softjam, "info", path, "--json"], capture_output=True, text=True)
+    if found.returncode not in (0, 3):  # 3: not converged
+        sys.exit(found.stderr)
+    info = json.loads(found.stdout)
     if "coordination" not in info["metrics"]:
         print(f"{path} holds no metrics, and is left out", file=sys.stderr)
         continue

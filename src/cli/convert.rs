@@ -4,7 +4,7 @@ use super::flags::ChannelFlags;
 use super::lines::Lines;
 use super::memory::MemoryFlag;
 use super::output::{Output, end_when_interrupted, open_with};
-use super::{Verdict, print};
+use super::{Verdict, report};
 use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
@@ -100,7 +100,7 @@ pub(super) fn write(
         );
     }
     lines.line("open it with", open_with(&output.path, output.format));
-    print(&lines.into_text())?;
+    report(&lines.into_text())?;
     if recording.is_closed() {
         return Ok(Verdict::Good);
     }

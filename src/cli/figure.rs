@@ -3,7 +3,7 @@
 use super::lines::Lines;
 use super::memory::MemoryFlag;
 use super::output::{Output, end_when_interrupted};
-use super::{Verdict, print};
+use super::{Verdict, report};
 use softjam::budget::Budget;
 use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
@@ -102,7 +102,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     figure::write_into(file, &svg)?;
     let mut lines = Lines::default();
     lines.line("figure", output.display());
-    print(&lines.into_text())?;
+    report(&lines.into_text())?;
     Ok(Verdict::Good)
 }
 

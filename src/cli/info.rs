@@ -1,35 +1,51 @@
 //! `softjam info`: says what a recording holds.
 
+mod table;
+
 use super::lines::Lines;
 use super::memory::MemoryFlag;
-use super::{Verdict, print};
+use super::{Verdict, complain, print};
+use softjam::budget::Budget;
 use softjam::contact::FrameContacts;
 use softjam::droplet::validity::{SQUEEZE_LIMIT, Validity};
 use softjam::frame::Frame;
 use softjam::record::Outcome;
 use softjam::relax::Stability;
-use softjam::replay::{Event, ReadError, Recording};
+use softjam::replay::{Event, ReadError, Recording, Standing};
+use softjam::text::shown;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use table::Row;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   softjam info run.rrd                        what was run, how it ended, what is recorded
-  softjam info run.rrd --json | jq .f_max     one object for scripts: phi, box, converged, metrics, squeeze, …
+  softjam info run.rrd --json | jq .f_max     one object for scripts: status, particles, phi, seed, metrics, squeeze, …
+  softjam info a.rrd b.rrd c.mcap             a table, a line a file; with --csv for other programs, with --json an array
+  softjam info run.rrd > what.txt && echo converged
+
+The status of a recording is one word: converged, step-limit (it ended by its step limit), interrupted (its writer closed it before
+the run had a result) or broken-off (the file was cut, or cut and then mended by another program).
 
 The squeeze of a particle is Σf/2πγ over its contacts, at the last state: beyond 0.0659 the model's own forces are too small
 by more than 10 %.
 
-Exit codes: 0 read to its end, 1 damaged or not a recording (what comes before the damage is told), 2 a bad flag")]
+Exit codes: 0 converged, 1 damaged or not a recording (what comes before the damage is told; others are told all the same), 2 a bad
+flag, 3 not converged: step-limit, interrupted or broken-off")]
 pub struct Arguments {
-    /// The recording, .rrd or .mcap.
-    #[arg(value_name = "RUN.rrd")]
-    file: PathBuf,
+    /// The recordings, .rrd or .mcap; of several there is a table.
+    #[arg(value_name = "RUN.rrd", required = true)]
+    files: Vec<PathBuf>,
 
-    /// Print one JSON object instead of lines.
+    /// Print one JSON object instead of lines, an array of them for several files.
     #[arg(long)]
     json: bool,
+
+    /// Print the table as CSV, with all digits: file, status, stability, model, particles, phi, seed, steps, f_max,
+    /// coordination, pressure, energy, rattlers.
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
 
     #[command(flatten)]
     memory: MemoryFlag,
@@ -87,6 +103,14 @@ impl Findings {
         found
     }
 
+    /// How the run stood, as far as it was read.
+    fn standing(&self, recording: &Recording) -> Standing {
+        match self.damage {
+            Some(_) => Standing::BrokenOff,
+            None => recording.standing(),
+        }
+    }
+
     /// How far the last state strains the linear model; nothing if it is no state of this packing.
     fn squeeze(&self, recording: &Recording) -> Option<Validity> {
         let last = self.last.as_ref()?;
@@ -98,34 +122,88 @@ impl Findings {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let mut recording = Recording::open_within(&arguments.file, arguments.memory.budget())?;
-    let found = Findings::of(&mut recording);
-    let closed = recording.is_closed();
-    if arguments.json {
-        print(&json(&recording, &found, closed))?;
+    let budget = arguments.memory.budget();
+    if let [file] = arguments.files.as_slice()
+        && !arguments.csv
+    {
+        let (recording, found) = read(file, budget)?;
+        let name = file.display().to_string();
+        let standing = found.standing(&recording);
+        print(&if arguments.json {
+            format!("{:#}\n", json(&name, &recording, &found))
+        } else {
+            text(&name, &recording, &found)
+        })?;
+        return match found.damage {
+            Some(error) => Err(error.into()),
+            None if standing == Standing::Converged => Ok(Verdict::Good),
+            None => Ok(Verdict::Bad),
+        };
+    }
+    let (mut rows, mut objects) = (Vec::new(), Vec::new());
+    let mut verdict = Verdict::Good;
+    for file in &arguments.files {
+        let name = file.display().to_string();
+        match read(file, budget) {
+            Ok((recording, found)) => {
+                if arguments.json {
+                    objects.push(json(&name, &recording, &found));
+                } else {
+                    rows.push(Row::of(&name, &recording, &found));
+                }
+                let standing = found.standing(&recording);
+                match found.damage {
+                    Some(error) => {
+                        complain(&error.into());
+                        verdict = Verdict::Incomplete;
+                    }
+                    None if standing != Standing::Converged => verdict.worsen(),
+                    None => {}
+                }
+            }
+            Err(error) => {
+                objects
+                    .push(serde_json::json!({ "file": shown(&name), "damage": error.to_string() }));
+                rows.push(Row::unreadable(&name));
+                complain(&error.into());
+                verdict = Verdict::Incomplete;
+            }
+        }
+    }
+    print(&if arguments.json {
+        format!("{:#}\n", serde_json::Value::Array(objects))
+    } else if arguments.csv {
+        table::csv(&rows)
     } else {
-        print(&text(
-            &arguments.file.display().to_string(),
-            &recording,
-            &found,
-            closed,
-        ))?;
-    }
-    match found.damage {
-        Some(error) => Err(error.into()),
-        None => Ok(Verdict::Good),
+        table::text(&rows)
+    })?;
+    Ok(verdict)
+}
+
+/// A recording read to its end, and what it holds.
+fn read(file: &Path, budget: Budget) -> Result<(Recording, Findings), ReadError> {
+    let mut recording = Recording::open_within(file, budget)?;
+    let found = Findings::of(&mut recording);
+    Ok((recording, found))
+}
+
+fn state_of(recording: &Recording, found: &Findings) -> String {
+    let ended = found
+        .result
+        .map(|end| format!("{end}, f_max = {:.3e} γ", end.f_max));
+    match (found.standing(recording), ended) {
+        (Standing::Converged | Standing::StepLimit, Some(ended)) => ended,
+        (Standing::BrokenOff, Some(ended)) => format!("{ended}; the file breaks off behind it"),
+        (Standing::BrokenOff, None) if recording.is_closed() => {
+            "unfinished: cut off or interrupted, and then rewritten by another program".to_owned()
+        }
+        (Standing::BrokenOff, None) => "unfinished: the file breaks off".to_owned(),
+        _ => "unfinished: the run was interrupted or failed".to_owned(),
     }
 }
 
-fn state_of(found: &Findings, closed: bool) -> String {
-    match (found.result, closed) {
-        (Some(end), _) => format!("{end}, f_max = {:.3e} γ", end.f_max),
-        (None, true) => "unfinished: the run was interrupted or failed".to_owned(),
-        (None, false) => "unfinished: the file breaks off".to_owned(),
-    }
-}
-
-fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> String {
+fn text(path: &str, recording: &Recording, found: &Findings) -> String {
+    let closed = recording.is_closed();
     let mut lines = Lines::default();
     let l = recording.domain().lengths();
     let scene = recording.scene();
@@ -134,7 +212,7 @@ fn text(path: &str, recording: &Recording, found: &Findings, closed: bool) -> St
         "recorded by",
         format!("{} (bits {})", recording.program(), recording.bits()),
     );
-    lines.line("result", state_of(found, closed));
+    lines.line("result", state_of(recording, found));
     lines.line(
         "packing",
         format!(
@@ -193,7 +271,7 @@ fn hex(digest: [u8; 32]) -> String {
     blake3::Hash::from_bytes(digest).to_hex().to_string()
 }
 
-fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
+fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Value {
     let l = recording.domain().lengths();
     let channels: serde_json::Map<String, serde_json::Value> = found
         .channels
@@ -203,13 +281,17 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
             (name.clone(), value)
         })
         .collect();
-    let value = serde_json::json!({
+    serde_json::json!({
+        "file": shown(path),
         "program": recording.program(),
         "bits": recording.bits(),
+        "model": table::MODEL,
         "particles": recording.radii().len(),
         "phi": recording.coverage(),
+        "seed": table::seed(recording),
         "box": [l.x, l.y],
-        "closed": closed,
+        "status": found.standing(recording).to_string(),
+        "closed": recording.is_closed(),
         "converged": found.result.map(|r| r.converged),
         "stability": found.result.and_then(|r| r.stability).map(Stability::name),
         "steps": found.result.map(|r| r.steps),
@@ -226,6 +308,5 @@ fn json(recording: &Recording, found: &Findings, closed: bool) -> String {
         "metrics": found.metrics,
         "damage": found.damage.as_ref().map(ToString::to_string),
         "scene": recording.scene().to_toml(),
-    });
-    format!("{value:#}\n")
+    })
 }

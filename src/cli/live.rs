@@ -1,6 +1,6 @@
 //! The flags of the live view, and what is said of it.
 
-use super::{print, warn};
+use super::{report, warn};
 use softjam::record::{Ended, Header, Live, Outcome, Viewer};
 
 /// A viewer to look on through.
@@ -78,7 +78,7 @@ impl View {
         let shown = live.finish(outcome);
         let of = format!("{} of {} recorded steps", shown.sent, shown.of);
         match shown.ended {
-            Ended::Complete => print(&format!("{:<14} {of} shown at {place}\n", "live view"))?,
+            Ended::Complete => report(&format!("{:<14} {of} shown at {place}\n", "live view"))?,
             Ended::Absent => warn(&format!("no live view: no viewer came up at {place}")),
             Ended::Late => warn(&format!("the viewer at {place} was too slow: {of} sent")),
             Ended::Lost(why) => warn(&format!(

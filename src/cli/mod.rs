@@ -27,13 +27,15 @@ use softjam::scene::SceneError;
 use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done, and the verdict is good (converged; replay agrees)
   1  could not be done: I/O, a damaged file, a numerical failure, an interruption
   2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way or is being written
-  3  done, and the verdict is bad (not converged within the step limit; replay differs; forces out of balance)";
+  3  done, and the verdict is bad (not converged within the step limit; info: not converged, for whatever reason; replay differs;
+     forces out of balance)";
 
 /// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
 #[derive(Parser)]
@@ -41,6 +43,11 @@ Exit codes:
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
+
+    /// Tell nothing but results and errors: no warnings, no progress, no report on the files that were written. What info,
+    /// replay, scene and manual print is their result.
+    #[arg(long, short, global = true)]
+    quiet: bool,
 }
 
 /// Name, version, and what a recording says of its own: the revision of the bits and the layout.
@@ -74,12 +81,30 @@ enum Verb {
 enum Verdict {
     Good,
     Bad,
-    /// The user ended it.
-    Interrupted,
+    /// It was not brought to its end: the user ended it, the file breaks off, or some of several files could not be read.
+    Incomplete,
+}
+
+impl Verdict {
+    /// Bad, unless it is worse already.
+    fn worsen(&mut self) {
+        if matches!(self, Self::Good) {
+            *self = Self::Bad;
+        }
+    }
+}
+
+/// Whether only results and errors are told.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Whether what is no result may be told: warnings, progress, reports on files that were written.
+fn talks() -> bool {
+    !QUIET.load(Ordering::Relaxed)
 }
 
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
+    QUIET.store(cli.quiet, Ordering::Relaxed);
     // A decoder's panic over a damaged file is told as an error; anything else is a fault of ours and speaks up.
     let speak_up = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -100,13 +125,18 @@ pub fn run() -> ExitCode {
     match result {
         Ok(Verdict::Good) => ExitCode::SUCCESS,
         Ok(Verdict::Bad) => ExitCode::from(3),
-        Ok(Verdict::Interrupted) => ExitCode::from(1),
+        Ok(Verdict::Incomplete) => ExitCode::from(1),
         Err(error) => {
-            // Nobody is left to tell if standard error is closed too.
-            let _ = writeln!(std::io::stderr(), "error: {}", message(&error));
+            complain(&error);
             ExitCode::from(exit_code(&error))
         }
     }
+}
+
+/// Tells an error.
+fn complain(error: &anyhow::Error) {
+    // Nobody is left to tell if standard error is closed too.
+    let _ = writeln!(std::io::stderr(), "error: {}", message(error));
 }
 
 /// The chain of causes, without those that the error before them has already quoted.
@@ -168,8 +198,16 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 }
 
 fn warn(text: &str) {
+    if !talks() {
+        return;
+    }
     // A warning that nobody can read is no failure.
     let _ = writeln!(std::io::stderr(), "warning: {}", softjam::text::lines(text));
+}
+
+/// Writes a report on what was done to standard output.
+fn report(text: &str) -> anyhow::Result<()> {
+    if talks() { print(text) } else { Ok(()) }
 }
 
 /// Writes a result to standard output; a closed pipe (`| head`) is no failure.

@@ -5,7 +5,7 @@ use super::lines::Lines;
 use super::live::LiveFlags;
 use super::memory::MemoryFlag;
 use super::output::{Output, open_with};
-use super::{Verdict, print, warn};
+use super::{Verdict, talks, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::BITS;
 use softjam::budget::Budget;
@@ -159,7 +159,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     });
     bar.clear();
     let summary = recorded?;
-    print(&report(
+    super::report(&report(
         &outputs,
         &scene,
         &run,
@@ -173,7 +173,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
         warn(&warning);
     }
     Ok(match summary.outcome {
-        None => Verdict::Interrupted,
+        None => Verdict::Incomplete,
         Some(outcome) if outcome.converged => Verdict::Good,
         Some(_) => Verdict::Bad,
     })
@@ -331,7 +331,7 @@ impl Continuation {
 /// The frame to go on from, and its scene with what the flags change about its end and its recording.
 fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> {
     let mut recording = Recording::open_within(path, arguments.memory.budget())?;
-    if recording.bits() != BITS {
+    if !recording.has_same_bits() {
         return Err(SceneError::Needs {
             field: "from".to_owned(),
             value: path.display().to_string(),
@@ -441,7 +441,7 @@ struct Progress {
 
 impl Progress {
     fn new(scene: &Scene, from: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = (talks() && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(1000);
             let style = ProgressStyle::with_template("{bar:24} {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

@@ -2,6 +2,7 @@
 
 use super::source::{Ending, Item, Problem, Source};
 use super::{Event, ReadError, Recording};
+use crate::BITS;
 use crate::frame::Frame;
 use crate::record::Outcome;
 use crate::scene::{Channels, Scene};
@@ -81,6 +82,7 @@ impl Recording {
         // A run that came to its step limit may have been given more steps.
         let (scene, mut header) = (last.scene().clone(), first.source_header());
         header.scene = scene.clone();
+        header.bits = last.bits();
         let (format, budget) = (first.format(), first.budget());
         let source = Joined {
             parts: parts.into(),
@@ -113,10 +115,10 @@ fn join(path: &str, problem: impl Into<String>) -> ReadError {
 /// How a recording cannot be of the run that another one is of.
 fn differs(first: &Recording, part: &Recording) -> Option<String> {
     let name = shown(first.path());
-    if first.bits() != part.bits() {
-        let (here, there) = (part.bits(), first.bits());
+    if let Some(other) = [first, part].iter().find(|part| !part.has_same_bits()) {
+        let (bits, name) = (other.bits(), shown(other.path()));
         return Some(format!(
-            "it was computed with bits {here}, {name} with bits {there}"
+            "{name} was computed with bits {bits}, this program computes with bits {BITS}"
         ));
     }
     let text = |recording: &Recording| {
@@ -188,8 +190,10 @@ impl Joined {
                 if !outcome.converged && limit != self.scene.steps {
                     return Ok(());
                 }
+                // Those of 0.2.0 and before do not say whether it is a minimum.
+                let known = |end: Outcome| (end.converged, end.steps, end.f_max.to_bits());
                 match self.outcome.replace(outcome) {
-                    Some(before) if before != outcome => Err(self.conflict("result")),
+                    Some(before) if known(before) != known(outcome) => Err(self.conflict("result")),
                     _ => Ok(()),
                 }
             }

@@ -342,7 +342,9 @@ impl Recording {
     #[must_use]
     pub fn has_same_bits(&self) -> bool {
         // Revision 2 changed Newton's method alone.
-        let unchanged = self.header.bits == 1 && self.scene().minimizer == Minimizer::Fire;
+        let legs = self.legs().iter().map(|leg| leg.minimizer);
+        let mut minimizers = legs.chain([self.scene().minimizer]);
+        let unchanged = self.header.bits == 1 && minimizers.all(|m| m == Minimizer::Fire);
         self.header.bits == crate::BITS || unchanged
     }
 

@@ -96,7 +96,7 @@ impl SceneFields {
     /// assert_eq!(SceneFields::read(&path).unwrap().phi, Some(0.9));
     /// std::fs::write(&path, b"phi = \xff").unwrap();
     /// let error = SceneFields::read(&path).unwrap_err();
-    /// assert_eq!(error.to_string(), "not a scene: byte 6 is not UTF-8 text");
+    /// assert_eq!(error.to_string(), "not a scene: line 1: byte 6 is not UTF-8 text");
     /// # std::fs::remove_file(&path).unwrap();
     /// ```
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
@@ -108,8 +108,12 @@ impl SceneFields {
                 source,
             })?;
         check_length(bytes.len())?;
-        let text = str::from_utf8(&bytes).map_err(|error| SceneError::Text {
-            problem: format!("byte {} is not UTF-8 text", error.valid_up_to()),
+        let text = str::from_utf8(&bytes).map_err(|error| {
+            let at = error.valid_up_to();
+            let line = bytes[..at].split(|b| *b == b'\n').count();
+            SceneError::Text {
+                problem: format!("line {line}: byte {at} is not UTF-8 text"),
+            }
         })?;
         Self::from_toml(text)
     }

@@ -183,7 +183,7 @@ fn a_message_of_a_terabyte_is_refused_unread() {
 }
 
 /// An MCAP record.
-fn mcap_record(opcode: u8, body: &[u8]) -> Vec<u8> {
+pub fn mcap_record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
 

@@ -186,7 +186,7 @@ fn lengths_that_a_file_only_claims_are_not_believed() {
 }
 
 /// Where the records of an MCAP file begin.
-fn mcap_records(bytes: &[u8]) -> Vec<usize> {
+pub fn mcap_records(bytes: &[u8]) -> Vec<usize> {
     let (mut start, mut starts) = (8, Vec::new());
     while start + 9 < bytes.len() {
         starts.push(start);

@@ -4,6 +4,7 @@ mod convert;
 #[cfg(unix)]
 mod files;
 mod help;
+mod info;
 mod live;
 mod parts;
 mod replay;
@@ -243,7 +244,7 @@ fn a_step_limit_that_comes_first_exits_with_3() {
     assert_eq!(code, Some(3));
     assert!(out.contains("not converged within 10 steps"), "{out}");
     let (code, out, _) = run(folder.path(), &["info", "softjam.rrd"]);
-    assert_eq!(code, Some(0));
+    assert_eq!(code, Some(3));
     assert!(out.contains("not converged within 10 steps"), "{out}");
 }
 
@@ -283,7 +284,7 @@ fn an_interrupted_run_leaves_a_readable_recording() {
         let status = child.wait().expect("softjam ends");
         assert_eq!(status.code(), Some(1));
         let (code, out, errors) = run(folder.path(), &["info", signal]);
-        assert_eq!(code, Some(0), "{errors}");
+        assert_eq!(code, Some(3), "{errors}");
         assert!(out.contains("unfinished: the run was interrupted"), "{out}");
     }
 }

@@ -7,6 +7,7 @@ mod verdict;
 use super::memory::MemoryFlag;
 use super::{Verdict, print};
 use clap::ValueEnum;
+use softjam::replay::Standing;
 use std::path::PathBuf;
 use verdict::examine;
 
@@ -73,9 +74,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     })?;
     Ok(if !good {
         Verdict::Bad
-    } else if found.closed {
+    } else if found.standing != Standing::BrokenOff {
         Verdict::Good
     } else {
-        Verdict::Interrupted
+        Verdict::Incomplete
     })
 }

@@ -1,6 +1,6 @@
 //! What a replay that takes long says of itself, on standard error.
 
-use crate::cli::warn;
+use crate::cli::{talks, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use softjam::replay::Recording;
 use std::io::IsTerminal as _;
@@ -32,9 +32,7 @@ impl Progress {
         let limit = recording.scene().steps;
         let thread = std::thread::spawn(move || {
             let start = Instant::now();
-            let bar = std::io::stderr()
-                .is_terminal()
-                .then(ProgressBar::new_spinner);
+            let bar = (talks() && std::io::stderr().is_terminal()).then(ProgressBar::new_spinner);
             if let Some(bar) = &bar {
                 let style = ProgressStyle::with_template("{spinner} {msg}");
                 bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));

@@ -6,8 +6,8 @@ use crate::cli::lines::Lines;
 use softjam::BITS;
 use softjam::record::{Leg, Outcome, PROGRAM};
 use softjam::replay::{
-    Balance, Bytes, Determinism, Origin, Recording, ReplayError, State, Way, Worst, determinism,
-    place_of_byte,
+    Balance, Bytes, Determinism, Origin, Recording, ReplayError, Standing, State, Way, Worst,
+    determinism, place_of_byte,
 };
 use softjam::text::shown;
 use std::fs::File;
@@ -20,7 +20,8 @@ pub(super) struct Findings {
     determinism: Option<Determinism>,
     balance: Option<Balance>,
     result: Option<Outcome>,
-    pub closed: bool,
+    pub standing: Standing,
+    closed: bool,
     last: Option<u64>,
     from_step: u64,
     legs: Vec<Leg>,
@@ -110,6 +111,7 @@ pub(super) fn examine(arguments: &Arguments) -> Result<Findings, ReplayError> {
         determinism: found,
         balance,
         result: recording.outcome(),
+        standing: recording.standing(),
         closed: recording.is_closed(),
         last: recording.intact(),
         from_step: recording.from_step(),
@@ -152,6 +154,9 @@ impl Findings {
         let last = self.last.unwrap_or(0);
         match (self.result, self.closed) {
             (Some(_), true) => None,
+            (None, true) if self.standing == Standing::BrokenOff => Some(format!(
+                "incomplete: no result behind step {last}; the file was cut or the run interrupted, before another program rewrote it"
+            )),
             (None, true) => Some(format!("the run was interrupted behind step {last}")),
             (Some(_), false) => Some("the file breaks off behind its result: no footer".to_owned()),
             (None, false) => Some(format!("the file breaks off behind step {last}: no result")),
