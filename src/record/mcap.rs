@@ -9,7 +9,7 @@
 //! | `/metrics` | `softjam.v1.Metrics` | the scalars of a step |
 //! | `/state` | `softjam.v1.State` | lossless |
 //!
-//! The metadata record `softjam` (format version, program, digest of the scene, first step) and the attachment `scene.toml`
+//! The metadata record `softjam` (format version, program, digest of the scene, first step, legs if it was changed on its way) and the attachment `scene.toml`
 //! come first, the metadata record `softjam.result` last; its absence means an unfinished run. Log time is the step in
 //! milliseconds, since MCAP wants a clock and the steps are the only one that two machines agree on.
 //!

@@ -3,7 +3,7 @@
 //! | entity | content |
 //! | --- | --- |
 //! | `/__properties` | what the viewer lists the recording as: number of particles, coverage and start |
-//! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program`, `:bits`, `:from_step` |
+//! | `/scene` | the scene as text; `softjam.Scene:toml`, `:format_version`, `:program`, `:bits`, `:from_step`, and `:legs` where the run was changed on its way |
 //! | `/world`, `/world/box`, `/world/legend` | y up; the periodic box; what colours and widths mean |
 //! | `/world/contours` | particle polygons, coloured by the pressure `p_i = Σ_j f_ij / 2πR_i` on the particle |
 //! | `/world/contours/images` | those that cross an edge, at its other side; `softjam.Image:particle` is the particle |

@@ -39,7 +39,7 @@ pub fn record_all(
             recorder.record(&snapshot)?;
         }
         if last {
-            return recorder.finish(Outcome::of(&run));
+            return recorder.finish(Outcome::of(run));
         }
         run.advance().expect("a step");
     }

@@ -37,12 +37,7 @@ fn part(scene: &Scene, from: u64, until: u64) -> Vec<u8> {
             recorder.record(&snapshot).expect("recorded");
         }
         if ended || run.step() == until {
-            let outcome = ended.then(|| Outcome {
-                converged: true,
-                steps: run.step(),
-                f_max: run.f_max(),
-            });
-            recorder.finish(outcome).expect("closed");
+            recorder.finish(Outcome::of(&run)).expect("closed");
             break;
         }
         run.advance().expect("a step");
@@ -88,7 +83,7 @@ fn is_of(message: &[u8], entity: &str) -> bool {
 
 fn first_error(bytes: &[u8]) -> ReadError {
     match open(bytes) {
-        Ok(recording) => recording.filter_map(Result::err).next().expect("an error"),
+        Ok(mut recording) => recording.find_map(Result::err).expect("an error"),
         Err(error) => error,
     }
 }

@@ -222,12 +222,13 @@ impl Findings {
             Origin::Frame => "the scene run again from the first recorded state",
         };
         let legs = self.legs.iter().filter(|_| d.origin == Origin::Scene);
-        let legs: String = legs
-            .map(|leg| {
-                let (until, threshold) = (leg.until, leg.threshold);
-                format!(" (to step {until} with the threshold {threshold:e}, the minimiser and the forces of before)")
-            })
-            .collect();
+        let legs = legs.map(|leg| {
+            let (until, threshold) = (leg.until, leg.threshold);
+            format!(
+                " (to step {until} with the threshold {threshold:e}, the minimiser and the forces of before)"
+            )
+        });
+        let legs = legs.collect::<Vec<_>>().concat();
         let begin = format!("{begin}{legs}");
         if nothing_was_run(d) {
             not.push("anything of the run: no step leads to the only recorded state".to_owned());

@@ -1,6 +1,7 @@
 //! Runs in parts: `softjam record --from` with whatever can be changed there, and `softjam join`.
 
 use super::{folder, record, run};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -117,7 +118,7 @@ fn a_run_from_a_file_is_not_taken_up_where_its_replay_would_have_nothing_to_run(
     let mut csv = "# box = 8, 8\nx,y,radius\n".to_owned();
     for k in 0..49 {
         let (x, y) = (f64::from(k % 7) * 8.0 / 7.0, f64::from(k / 7) * 8.0 / 7.0);
-        csv.push_str(&format!("{},{y},0.62\n", x + 0.1 * f64::from(k % 3)));
+        writeln!(csv, "{},{y},0.62", x + 0.1 * f64::from(k % 3)).expect("a String grows");
     }
     fs::write(folder.path().join("mine.csv"), csv).expect("written");
     let line = ["record", "--file", "mine.csv", "-o", "a.rrd"];
