@@ -224,6 +224,21 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
             scene.line_tension
         ),
     );
+    if recording.from_step() > 0 {
+        let changed = recording.legs().iter().any(|leg| leg.changes(scene));
+        let how = if changed {
+            ", there or before with another threshold, minimiser or forces"
+        } else {
+            ""
+        };
+        lines.line(
+            "goes on",
+            format!(
+                "from step {} of another recording{how}",
+                recording.from_step()
+            ),
+        );
+    }
     for (channel, (count, first, last)) in &found.channels {
         let pictures =
             scene.channels.redraw > 0.0 && ["contours", "contacts"].contains(&&**channel);
@@ -291,6 +306,8 @@ fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Valu
         "seed": table::seed(recording),
         "box": [l.x, l.y],
         "status": found.standing(recording).to_string(),
+        "from_step": recording.from_step(),
+        "legs": recording.legs(),
         "closed": recording.is_closed(),
         "converged": found.result.map(|r| r.converged),
         "stability": found.result.and_then(|r| r.stability).map(Stability::name),

@@ -113,9 +113,14 @@ mod tests {
         assert!(from_text(&text, 8).is_err(), "behind the first step");
         let swapped = to_text(&[legs[2], legs[0]]).unwrap().unwrap();
         assert!(from_text(&swapped, 9).is_err(), "not in order");
-        for bad in ["nan", "-1.0", "0.0", "inf", "\"x\""] {
-            let text = text.replace("1e-10", bad);
-            assert!(from_text(&text, 9).is_err(), "{bad}");
+        for threshold in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
+            let bad = Leg {
+                threshold,
+                ..legs[0]
+            };
+            let text = to_text(&[bad]).unwrap().unwrap();
+            assert!(from_text(&text, 9).is_err(), "{threshold}");
         }
+        assert!(from_text("leg = 3", 9).is_err());
     }
 }

@@ -92,6 +92,13 @@ fn a_run_that_is_changed_twice_on_its_way_is_verified_from_its_start_and_survive
     for words in ["from its start (to step 60", "(to step 120"] {
         assert!(out.contains(words), "{out}");
     }
+    let (_, out, _) = run(folder.path(), &["info", "c.rrd", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&out).expect("one JSON object");
+    assert_eq!(
+        (&info["from_step"], &info["legs"][1]["until"]),
+        (&120.into(), &120.into())
+    );
+    assert_eq!(info["legs"][0]["forces"], "central");
     // It is no run of its scene alone.
     let line = [
         "record",
