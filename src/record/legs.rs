@@ -70,6 +70,9 @@ struct Text {
     leg: Vec<Leg>,
 }
 
+/// More than anybody changes a run; each takes as long as a step.
+const MOST: usize = 1000;
+
 /// The stretches as TOML; nothing if there are none.
 pub(crate) fn to_text(legs: &[Leg]) -> std::io::Result<Option<String>> {
     if legs.is_empty() {
@@ -85,6 +88,12 @@ pub(crate) fn from_text(text: &str, from_step: u64) -> Result<Vec<Leg>, String> 
     let Text { leg: legs } = toml::from_str(text).map_err(|e| e.message().to_owned())?;
     let ends = legs.iter().map(|leg| leg.until).chain([from_step]);
     let sensible = |leg: &Leg| leg.threshold.is_finite() && leg.threshold > 0.0;
+    if legs.len() > MOST {
+        return Err(format!(
+            "its scene was changed {} times, which no run is",
+            legs.len()
+        ));
+    }
     if !ends.is_sorted() || !legs.iter().all(sensible) {
         return Err("its earlier scenes are out of order or range".to_owned());
     }
@@ -122,5 +131,7 @@ mod tests {
             assert!(from_text(&text, 9).is_err(), "{threshold}");
         }
         assert!(from_text("leg = 3", 9).is_err());
+        let many = to_text(&vec![legs[0]; MOST + 1]).unwrap().unwrap();
+        assert!(from_text(&many, 9).is_err());
     }
 }
