@@ -10,6 +10,8 @@
 //! assert_eq!(shown("a\nverdict  verified\u{1b}[2J"), r"a\nverdict  verified\u{1b}[2J");
 //! ```
 
+use core::fmt::Display;
+
 /// Characters of a name or a value that are shown at most.
 ///
 /// ```
@@ -20,6 +22,34 @@ pub const LONGEST: usize = 240;
 
 /// Characters of a whole message that are shown at most.
 const LONGEST_MESSAGE: usize = 8000;
+
+/// A number of things, in the plural unless it is one: for nouns that take an s.
+///
+/// ```
+/// use softjam::text::counted;
+/// assert_eq!([0, 1, 2].map(|n| counted(n, "rattler")), ["0 rattlers", "1 rattler", "2 rattlers"]);
+/// ```
+#[must_use]
+pub fn counted(count: impl Display, noun: &str) -> String {
+    let count = count.to_string();
+    let ending = if count == "1" { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
+/// A length as a person reads it, in whatever unit: five digits or more that mean something.
+///
+/// ```
+/// use softjam::text::length;
+/// assert_eq!([18.60094, 0.0186, 1.86e-12, 1.86e12].map(length), ["18.601", "0.018600", "1.8600e-12", "1.8600e12"]);
+/// ```
+#[must_use]
+pub fn length(length: f64) -> String {
+    match length.abs() {
+        1.0..1e6 => format!("{length:.3}"),
+        0.01..1.0 => format!("{length:.6}"),
+        _ => format!("{length:.4e}"),
+    }
+}
 
 /// A name or a value as one line: characters that are not seen are written as escapes, and what is longer than [`LONGEST`]
 /// ends with an ellipsis. What is fit to be shown comes out as it went in.

@@ -5,7 +5,7 @@ use super::memory::MemoryFlag;
 use super::output::{Output, end_when_interrupted};
 use super::{Verdict, report};
 use softjam::budget::Budget;
-use softjam::figure::{self, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
+use softjam::figure::{self, CHART_WIDTH, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
@@ -19,6 +19,8 @@ use std::path::{Path, PathBuf};
 Examples:
   softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
   softjam figure run.rrd --step 0 --disks -o disks.png    the undeformed disks of step 0
+  softjam figure run.rrd --width 86mm -o column.pdf       for one column of a journal
+  softjam figure run.rrd --range 0..2 -o same-scale.svg   a colour scale that several figures share
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
   softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
   softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
@@ -31,12 +33,12 @@ pub struct Arguments {
     #[arg(value_name = "RUN.rrd", required = true)]
     files: Vec<PathBuf>,
 
-    /// File to write; its name ends in .svg or .png.
+    /// File to write; its name ends in .svg, .pdf or .png (300 pixels an inch).
     #[arg(long, short, value_name = "FIGURE.svg")]
     output: PathBuf,
 
     /// Draw f_max (units of γ) against step instead of a packing, with the thresholds as dashed lines.
-    #[arg(long, conflicts_with_all = ["step", "disks", "color", "no_chains"])]
+    #[arg(long, conflicts_with_all = ["step", "disks", "color", "range", "no_chains"])]
     fmax: bool,
 
     /// The recorded step to draw: a number or `last`.
@@ -51,9 +53,19 @@ pub struct Arguments {
     #[arg(long, value_name = "QUANTITY", default_value = "pressure", value_parser = super::flags::named::<ColorBy>)]
     color: ColorBy,
 
+    /// The numbers at the ends of the colour bar, in units of the quantity that is shown [default: round numbers around the values
+    /// of all but the last fiftieth of the particles at either end].
+    #[arg(long, value_name = "LOW..HIGH", value_parser = range, allow_hyphen_values = true)]
+    range: Option<[f64; 2]>,
+
     /// Leave out the force chains: lines between centres, as wide as the force.
     #[arg(long)]
     no_chains: bool,
+
+    /// Width of the figure, in mm, cm, in, pt or px (96 an inch): 86mm is one column of many journals, 178mm two. Text is 8
+    /// points in narrow figures and 10 in wide ones [default: 668px, with --fmax 720px].
+    #[arg(long, value_name = "WIDTH", value_parser = width)]
+    width: Option<f64>,
 
     /// Replace an existing file, when the new one is whole.
     #[arg(long, short)]
@@ -79,9 +91,45 @@ fn step(text: &str) -> Result<Step, String> {
     }
 }
 
+/// Two numbers, ascending, between which `..` or a comma stands.
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once("..").or_else(|| text.split_once(','));
+    let number = |end: &str| end.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    let ends = ends.and_then(|(low, high)| Some([number(low)?, number(high)?]));
+    let ends = ends.ok_or("a range is two numbers, as 0..2 or 0.5,1.5")?;
+    let wide = ends[0] < ends[1] && (ends[1] - ends[0]).is_finite();
+    let refused = || format!("the range {text} is empty: the first number is to be the lower one");
+    wide.then_some(ends).ok_or_else(refused)
+}
+
+/// The narrowest and the widest figure (pixels).
+const WIDTHS: core::ops::RangeInclusive<f64> = 150.0..=8000.0;
+
+/// A length, in pixels of 96 an inch.
+fn width(text: &str) -> Result<f64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let pixels = match &text[digits.len()..] {
+        "" | "px" => Some(1.0),
+        "mm" => Some(96.0 / 25.4),
+        "cm" => Some(96.0 / 2.54),
+        "in" => Some(96.0),
+        "pt" => Some(96.0 / 72.0),
+        _ => None,
+    };
+    let number: Option<f64> = digits.trim().parse().ok();
+    let width = pixels.zip(number).map(|(pixels, number)| pixels * number);
+    let width = width.ok_or("a width is a number in mm, cm, in, pt or px, such as 86mm")?;
+    let refused = || format!("the width {text} is outside 40 … 2100 mm (150 … 8000 px)");
+    WIDTHS.contains(&width).then_some(width).ok_or_else(refused)
+}
+
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let output = &arguments.output;
     figure::check_name(output)?;
+    if arguments.range.is_some() && arguments.color == ColorBy::Nothing {
+        let problem = "--range is for colours, of which --color nothing has none".to_owned();
+        return Err(FigureError::Nothing(problem).into());
+    }
     let inputs: Vec<Option<&Path>> = arguments.files.iter().map(|f| Some(f.as_path())).collect();
     Output::named(output).check(&inputs, arguments.force)?;
     end_when_interrupted()?;
@@ -89,7 +137,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let budget = arguments.memory.budget();
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path, budget));
-        figure::relaxation(&named(runs.collect::<anyhow::Result<Vec<_>>>()?))?
+        let runs = named(runs.collect::<anyhow::Result<Vec<_>>>()?);
+        figure::relaxation_in(arguments.width.unwrap_or(CHART_WIDTH), &runs)?
     } else {
         let [path] = arguments.files.as_slice() else {
             return Err(FigureError::Nothing(
@@ -209,7 +258,8 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
         },
         color: arguments.color,
         chains: !arguments.no_chains,
-        ..Style::default()
+        width: arguments.width.unwrap_or(Style::default().width),
+        range: arguments.range,
     };
     let packing = recording.packing(&frame)?;
     let line_tension = recording.scene().line_tension;

@@ -69,7 +69,7 @@ enum Verb {
     Convert(convert::Arguments),
     /// Join the parts of a run that was interrupted to the recording that it would have been.
     Join(join::Arguments),
-    /// Draw a packing, or the fall of f_max, as SVG or PNG.
+    /// Draw a packing, or the fall of f_max, as SVG, PDF or PNG.
     Figure(figure::Arguments),
     /// Write the manual pages, or print the completions of a shell.
     Manual(manual::Arguments),

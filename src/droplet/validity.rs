@@ -21,6 +21,7 @@
 //! a droplet to a point with a finite force.
 
 use crate::contact::Contacts;
+use crate::text::counted;
 
 /// The squeeze at which the model's own error in the force passes 10 %, for the worst of all numbers of contacts.
 ///
@@ -125,14 +126,19 @@ impl Validity {
     /// ```
     #[must_use]
     pub fn warning(&self) -> Option<String> {
+        // A squeeze that no droplet survives is of no interest to three digits behind the point.
+        let number = |squeeze: f64| match squeeze {
+            s if s < 1000.0 => format!("{s:.3}"),
+            s => format!("{s:.1e}"),
+        };
         (self.beyond > 0).then(|| {
+            let (count, all) = (self.beyond, counted(self.particles, "particle"));
+            let are = if self.beyond == 1 { "is" } else { "are" };
             format!(
-                "{} of {} particles are squeezed beyond the range of the linear model (Σf/2πγ up to {:.3}, mean {:.3}, \
+                "{count} of {all} {are} squeezed beyond the range of the linear model (Σf/2πγ up to {}, mean {}, \
                  limit {SQUEEZE_LIMIT}): its own forces are too small there by more than 10 %, by up to {:.0} %",
-                self.beyond,
-                self.particles,
-                self.largest,
-                self.mean,
+                number(self.largest),
+                number(self.mean),
                 100.0 * model_error(self.largest)
             )
         })

@@ -1,42 +1,11 @@
-//! Curves over linear or logarithmic axes.
+//! Curves over linear or logarithmic axes, in a frame with marks and without a grid.
 
-use super::{FONT, FigureError};
-use core::ops::Range;
-use plotters::chart::ChartContext;
-use plotters::coord::Shift;
-use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-use plotters::element::DashedPathElement;
-use plotters::prelude::{
-    ChartBuilder, Circle, DashedLineSeries, DrawingArea, IntoDrawingArea, PathElement, SVGBackend,
-    SeriesLabelPosition,
-};
-use plotters::series::LineSeries;
-use plotters::style::{BLACK, Color, RGBColor, ShapeStyle, WHITE};
-use std::collections::BTreeSet;
-
-/// How the numbers of an axis are spaced.
-///
-/// See the example of [`chart`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scale {
-    /// Evenly.
-    #[default]
-    Linear,
-    /// By decades; what is not positive is left out.
-    Logarithmic,
-}
-
-/// An axis of a [`chart`].
-///
-/// See the example of [`chart`].
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Axis {
-    /// What it shows, with its unit; `f_max` is printed with its index.
-    pub title: String,
-    /// How its numbers are spaced.
-    pub scale: Scale,
-}
+use super::axis::{Axis, Ruler};
+use super::shades::hundredths;
+use super::{FONTS, FigureError, INK, font_size, with_f_max};
+use std::collections::BTreeMap;
+use svg::node::element::{Circle, Group, Line, Polyline, Rectangle, Text};
+use svg::{Document, Node as _};
 
 /// How a [`Curve`] is drawn.
 ///
@@ -68,16 +37,11 @@ pub struct Curve {
 }
 
 /// The colours of M. Okabe and K. Ito (2008), which the colour-blind can tell apart.
-const COLORS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
+const COLORS: [&str; 6] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
 ];
 
-/// How many curves of a [`chart`] have a colour of their own; from there on colours come again.
+/// How many curves of a [`chart`] have a colour of their own; from there on colours come again, with dashes.
 ///
 /// ```
 /// use softjam::figure::{Axis, CURVE_COLORS, Curve, chart};
@@ -95,15 +59,21 @@ const COLORS: [RGBColor; 6] = [
 pub const CURVE_COLORS: usize = COLORS.len();
 
 /// The colour of what is dashed.
-const GREY: RGBColor = RGBColor(60, 60, 60);
+const GREY: &str = "#3c3c3c";
 
-const SIZE: (u32, u32) = (720, 460);
+/// The width of a chart (pixels of the SVG, 96 an inch), where no other is asked for.
+///
+/// See the example of [`chart_in`].
+pub const CHART_WIDTH: f64 = 720.0;
 
-/// The backend knows whole units only; in quarters of a pixel curves are smooth.
-const FINE: u32 = 4;
+/// Height over width.
+const SHAPE: f64 = 0.64;
 
-/// Points beyond this number add bytes and nothing to the picture.
+/// Points of a curve beyond this number add bytes and nothing to the picture.
 const POINTS: usize = 4000;
+
+/// Width of a character (font sizes), a little more than the mean of the typeface.
+const CHARACTER: f64 = 0.58;
 
 /// Draws curves as SVG.
 ///
@@ -127,6 +97,25 @@ const POINTS: usize = 4000;
 /// assert!(chart(&Axis::default(), &Axis::default(), &[none]).is_err());
 /// ```
 pub fn chart(x: &Axis, y: &Axis, curves: &[Curve]) -> Result<String, FigureError> {
+    chart_in(CHART_WIDTH, x, y, curves)
+}
+
+/// [`chart`] of the given width (pixels of the SVG, 96 an inch); text is 8 points in narrow figures and 10 in wide ones.
+///
+/// # Errors
+///
+/// As [`chart`].
+///
+/// ```
+/// use softjam::figure::{Axis, CHART_WIDTH, Curve, chart, chart_in};
+///
+/// let curve = [Curve { points: vec![(0.0, 0.0), (1.0, 2.0)], ..Curve::default() }];
+/// let axis = Axis::default();
+/// let svg = chart_in(325.0, &axis, &axis, &curve).unwrap();
+/// assert!(svg.contains("width=\"325\""));
+/// assert_eq!(chart_in(CHART_WIDTH, &axis, &axis, &curve).unwrap(), chart(&axis, &axis, &curve).unwrap());
+/// ```
+pub fn chart_in(width: f64, x: &Axis, y: &Axis, curves: &[Curve]) -> Result<String, FigureError> {
     let reach = |c: &Curve, k: usize| {
         let (x, y) = c.points[k];
         let error = c.errors.get(k).copied().unwrap_or(0.0);
@@ -140,257 +129,362 @@ pub fn chart(x: &Axis, y: &Axis, curves: &[Curve]) -> Result<String, FigureError
     let shown = |&(a, b): &(f64, f64)| x.scale.place(a).is_some() && y.scale.place(b).is_some();
     let across = Ruler::over(x.scale, points().filter(shown).map(|p| p.0))?;
     let up = Ruler::over(y.scale, points().filter(shown).map(|p| p.1))?;
-    let mut svg = String::new();
-    let area =
-        SVGBackend::with_string(&mut svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
-    draw(&area, (x, across), (y, up), curves).map_err(|e| FigureError::Draw(e.to_string()))?;
-    drop(area);
-    let of_size = |(width, height): (u32, u32)| format!("width=\"{width}\" height=\"{height}\"");
-    let svg = svg.replacen(&of_size((SIZE.0 * FINE, SIZE.1 * FINE)), &of_size(SIZE), 1);
-    Ok(svg.replace("f_max", &super::f_max(16 * FINE)))
+    let (width, height) = (hundredths(width), hundredths(SHAPE * width));
+    let font = font_size(width);
+    let keys = keys(curves);
+    let mut sheet = Sheet::of((width, height), font, across, up);
+    let corner = sheet.free_corner(curves, &keys);
+    if corner.is_none() {
+        sheet.right -= key_size(&keys, font).0 + 0.8 * font;
+    }
+    let svg = Document::new()
+        .set("viewBox", (0, 0, width, height))
+        .set("width", width)
+        .set("height", height)
+        .set("font-family", FONTS)
+        .set("font-size", hundredths(font))
+        .set("fill", INK)
+        .add(
+            Rectangle::new()
+                .set("width", "100%")
+                .set("height", "100%")
+                .set("fill", "white"),
+        )
+        .add(sheet.axes((&x.title, &y.title), (width, height)))
+        .add(sheet.curves(curves, &keys))
+        .add(legend(&keys, font, sheet.legend_at(corner, &keys)))
+        .to_string();
+    Ok(with_f_max(&svg, 1.1 * font))
 }
 
-impl Scale {
-    /// Where a number lies on the axis; `None` if it has no place there.
-    fn place(self, value: f64) -> Option<f64> {
-        let at = match self {
-            Self::Linear => value,
-            Self::Logarithmic if value > 0.0 => libm::log10(value),
-            Self::Logarithmic => return None,
-        };
-        at.is_finite().then_some(at)
-    }
+/// A line of the legend, and how curves of that name are drawn.
+struct Key {
+    label: String,
+    color: &'static str,
+    mark: Mark,
+    /// Dash and gap (font sizes), where the line is not drawn through.
+    dash: Option<[f64; 2]>,
 }
 
-/// The numbers along an axis: its ends, and where its marks are, both as [`Scale::place`] counts.
-#[derive(Clone)]
-struct Ruler {
-    scale: Scale,
-    ends: Range<f64>,
-    step: f64,
-}
+/// Of thresholds and theories.
+const DASHES: [f64; 2] = [0.4, 0.3];
 
-impl Ruler {
-    fn over(scale: Scale, values: impl Iterator<Item = f64>) -> Result<Self, FigureError> {
-        let places = values.filter_map(|v| scale.place(v));
-        let (least, most) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(v), b.max(v))
-        });
-        if least > most {
-            let problem = "there is no point to draw".to_owned();
-            return Err(FigureError::Nothing(problem));
-        }
-        let (ends, step) = match scale {
-            Scale::Linear => linear(least, most)?,
-            Scale::Logarithmic => {
-                let from = libm::floor(least);
-                let to = libm::ceil(most).max(from + 1.0);
-                (from..to, libm::ceil((to - from) / 14.0))
-            }
-        };
-        Ok(Self { scale, ends, step })
-    }
-}
+/// Of curves whose color another has already.
+const LONG_DASHES: [f64; 2] = [0.9, 0.2];
 
-/// Ends and step of an axis of evenly spaced numbers.
-fn linear(least: f64, most: f64) -> Result<(Range<f64>, f64), FigureError> {
-    let step_of = |width: f64| {
-        let rough = width / 6.0;
-        let decade = libm::exp10(libm::floor(libm::log10(rough)));
-        let fits = |m: &f64| m * decade >= 0.999 * rough;
-        let step = [1.0, 2.0, 5.0].into_iter().find(fits);
-        step.map_or(10.0 * decade, |m| m * decade)
-    };
-    let (mut width, mut step) = (most - least, step_of(most - least));
-    if !(step > 0.0 && step.is_finite()) {
-        // One number, or numbers as good as one.
-        width = most.abs().max(1.0);
-        step = step_of(width);
-    }
-    // An axis that starts at zero starts there.
-    let from = if least == 0.0 {
-        0.0
-    } else {
-        least - 0.04 * width
-    };
-    let to = most + 0.04 * width;
-    if !(to - from).is_finite() {
-        let problem = format!("{least:e} and {most:e} do not go on one axis");
-        return Err(FigureError::Draw(problem));
-    }
-    Ok((from..to, step))
-}
-
-impl Ranged for Ruler {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let part = (value - self.ends.start) / (self.ends.end - self.ends.start);
-        limit.0 + libm::round(part * f64::from(limit.1 - limit.0)) as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
-        let first = libm::ceil(self.ends.start / self.step - 1e-9);
-        let last = libm::floor(self.ends.end / self.step + 1e-9);
-        (first as i64..=last as i64)
-            .map(|k| k as f64 * self.step)
-            .collect()
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.ends.clone()
-    }
-}
-
-impl ValueFormatter<f64> for Ruler {
-    fn format_ext(&self, at: &f64) -> String {
-        match self.scale {
-            Scale::Linear => {
-                let digits = (-libm::floor(libm::log10(self.step) + 1e-9)).max(0.0) as usize;
-                // No minus sign before zero.
-                format!("{:.digits$}", at + 0.0)
-            }
-            Scale::Logarithmic => super::decade(libm::round(*at) as i32),
-        }
-    }
-}
-
-type Problem = Box<dyn std::error::Error>;
-type Sheet<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
-
-fn draw(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
-    (x, across): (&Axis, Ruler),
-    (y, up): (&Axis, Ruler),
-    curves: &[Curve],
-) -> Result<(), Problem> {
-    area.fill(&WHITE)?;
-    let labels = (across.clone(), up.clone());
-    let corner = emptiest(&across, &up, curves);
-    let mut sheet = ChartBuilder::on(area)
-        .margin(14 * FINE)
-        .margin_right(24 * FINE)
-        .x_label_area_size(46 * FINE)
-        .y_label_area_size(74 * FINE)
-        .build_cartesian_2d(across, up)?;
-    sheet
-        .configure_mesh()
-        .x_desc(&x.title)
-        .y_desc(&y.title)
-        .x_label_formatter(&|v| labels.0.format_ext(v))
-        .y_label_formatter(&|v| labels.1.format_ext(v))
-        .light_line_style(WHITE.mix(0.0))
-        .bold_line_style(BLACK.mix(0.08).stroke_width(FINE))
-        .axis_style(BLACK.mix(0.75).stroke_width(FINE))
-        .label_style((FONT, 14 * FINE))
-        .axis_desc_style((FONT, 16 * FINE))
-        .draw()?;
-    let mut names: Vec<(&str, RGBColor)> = Vec::new();
+/// A key for each name, in the order in which they come.
+fn keys(curves: &[Curve]) -> Vec<Key> {
+    let mut keys: Vec<Key> = Vec::new();
     for curve in curves {
-        let known = names.iter().find(|(name, _)| *name == curve.label);
-        let colored = names.iter().filter(|(_, color)| *color != GREY).count();
-        let color = match (known, curve.mark) {
-            (Some((_, color)), _) => *color,
-            (_, Mark::Dashes) => GREY,
-            _ => COLORS[colored % COLORS.len()],
+        if keys.iter().any(|key| key.label == curve.label) {
+            continue;
+        }
+        let colored = keys.iter().filter(|key| key.color != GREY).count();
+        let (color, dash) = match curve.mark {
+            Mark::Dashes => (GREY, Some(DASHES)),
+            Mark::Line | Mark::Dots => (
+                COLORS[colored % COLORS.len()],
+                (colored >= COLORS.len()).then_some(LONG_DASHES),
+            ),
         };
-        let legend = known.is_none().then_some(curve.label.as_str());
-        if let Some(name) = legend {
-            names.push((name, color));
-        }
-        one(&mut sheet, (x.scale, y.scale), curve, color, legend)?;
+        keys.push(Key {
+            label: curve.label.clone(),
+            color,
+            mark: curve.mark,
+            dash,
+        });
     }
-    sheet
-        .configure_series_labels()
-        .position(corner)
-        .margin(10 * FINE)
-        .background_style(WHITE.mix(0.85))
-        .label_font((FONT, 14 * FINE))
-        .legend_area_size(30 * FINE)
-        .draw()?;
-    area.present()?;
-    Ok(())
+    keys
 }
 
-/// The corner in which a legend hides the fewest points.
-fn emptiest(across: &Ruler, up: &Ruler, curves: &[Curve]) -> SeriesLabelPosition {
-    // What a legend takes of the sheet, and a little more.
-    let labels: BTreeSet<&str> = curves.iter().map(|c| c.label.as_str()).collect();
-    let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0);
-    let width = (60.0 + 8.0 * longest as f64) / f64::from(SIZE.0 - 100);
-    let height = (20.0 + 20.0 * labels.len() as f64) / f64::from(SIZE.1 - 60);
-    let part = |ruler: &Ruler, value| {
-        let at = ruler.scale.place(value)? - ruler.ends.start;
-        Some(at / (ruler.ends.end - ruler.ends.start))
-    };
-    let points = || curves.iter().flat_map(|c| &c.points);
-    let hidden = |right: bool, top: bool| {
-        let beside = |x: f64| if right { x > 1.0 - width } else { x < width };
-        let level = |y: f64| if top { y > 1.0 - height } else { y < height };
-        points()
-            .filter(|p| part(across, p.0).is_some_and(beside) && part(up, p.1).is_some_and(level))
-            .count()
-    };
-    let corners = [
-        (SeriesLabelPosition::UpperRight, hidden(true, true)),
-        (SeriesLabelPosition::UpperLeft, hidden(false, true)),
-        (SeriesLabelPosition::LowerRight, hidden(true, false)),
-        (SeriesLabelPosition::LowerLeft, hidden(false, false)),
-    ];
-    // The first of equals.
-    let [first, others @ ..] = corners;
-    let best = others.into_iter().fold(
-        first,
-        |best, other| if other.1 < best.1 { other } else { best },
-    );
-    best.0
+/// Width and height of a legend.
+fn key_size(keys: &[Key], font: f64) -> (f64, f64) {
+    let longest = keys.iter().map(|key| key.label.chars().count()).max();
+    let text = CHARACTER * font * longest.unwrap_or(0) as f64;
+    (text + 2.6 * font, 1.45 * font * keys.len() as f64)
 }
 
-fn one(
-    sheet: &mut Sheet<'_, '_>,
-    (x, y): (Scale, Scale),
-    curve: &Curve,
-    color: RGBColor,
-    legend: Option<&str>,
-) -> Result<(), Problem> {
-    let place = |(a, b): (f64, f64)| Some((x.place(a)?, y.place(b)?));
-    let every = curve.points.len().div_ceil(POINTS).max(1);
-    let end = curve.points.len().saturating_sub(1);
-    let shown = (0..curve.points.len()).filter(|k| k % every == 0 || *k == end);
-    let points: Vec<(f64, f64)> = shown.filter_map(|k| place(curve.points[k])).collect();
-    let thin: ShapeStyle = color.stroke_width(3 * FINE / 2);
-    let bars = curve.points.iter().zip(&curve.errors);
-    let bars = bars.filter_map(|(&(a, b), e)| Some([place((a, b - e))?, place((a, b + e))?]));
-    sheet.draw_series(bars.map(|ends| PathElement::new(ends, thin)))?;
-    let (dash, gap, wide) = (5 * FINE, 4 * FINE, 22 * FINE as i32);
-    let series = match curve.mark {
-        Mark::Line => sheet.draw_series(LineSeries::new(points, thin))?,
-        Mark::Dashes => sheet.draw_series(DashedLineSeries::new(points, dash, gap, thin))?,
-        Mark::Dots => sheet.draw_series(
-            points
-                .into_iter()
-                .map(|p| Circle::new(p, 4 * FINE, color.filled())),
-        )?,
-    };
-    let Some(label) = legend else { return Ok(()) };
-    let series = series.label(label);
-    let key = color.stroke_width(5 * FINE / 2);
-    match curve.mark {
-        Mark::Line => {
-            series.legend(move |(x, y)| PathElement::new([(x, y), (x + wide, y)], key));
+/// The legend with its upper left corner there.
+fn legend(keys: &[Key], font: f64, (left, top): (f64, f64)) -> Group {
+    let mut group = Group::new();
+    for (k, key) in keys
+        .iter()
+        .enumerate()
+        .filter(|(_, key)| !key.label.is_empty())
+    {
+        let y = top + 1.45 * font * (k as f64 + 0.5);
+        match key.mark {
+            Mark::Dots => group.append(dot((left + font, y), key.color, font)),
+            Mark::Line | Mark::Dashes => {
+                let line = segment([(left, y), (left + 2.0 * font, y)], key.color, 1.8);
+                group.append(match dashes(key, font) {
+                    Some(dashes) => line.set("stroke-dasharray", dashes),
+                    None => line,
+                });
+            }
         }
-        Mark::Dashes => {
-            series.legend(move |(x, y)| {
-                let ends = [(x, y), (x + wide, y)].into_iter();
-                DashedPathElement::new(ends, dash, gap, key)
+        group.append(text(
+            &key.label,
+            (left + 2.6 * font, y + 0.36 * font),
+            "start",
+        ));
+    }
+    group
+}
+
+/// The frame that curves are drawn in.
+struct Sheet {
+    font: f64,
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    across: Ruler,
+    up: Ruler,
+}
+
+impl Sheet {
+    fn of((width, height): (f64, f64), font: f64, across: Ruler, up: Ruler) -> Self {
+        let numbers = up.labels();
+        let longest = numbers.iter().map(|(_, label)| label.chars().count()).max();
+        Self {
+            font,
+            // The title, the numbers, and air between the three.
+            left: font * (2.6 + CHARACTER * longest.unwrap_or(0) as f64),
+            right: width - 1.2 * font,
+            top: 0.8 * font,
+            bottom: height - 3.6 * font,
+            across,
+            up,
+        }
+    }
+
+    fn x(&self, part: f64) -> f64 {
+        self.left + part * (self.right - self.left)
+    }
+
+    fn y(&self, part: f64) -> f64 {
+        self.bottom - part * (self.bottom - self.top)
+    }
+
+    fn place(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+        Some((self.x(self.across.part(x)?), self.y(self.up.part(y)?)))
+    }
+
+    /// Frame, marks on all four sides, numbers and titles.
+    fn axes(&self, (x_title, y_title): (&str, &str), (width, height): (f64, f64)) -> Group {
+        let (font, long, short) = (self.font, 0.45 * self.font, 0.25 * self.font);
+        let mut group = Group::new().add(
+            Rectangle::new()
+                .set("x", hundredths(self.left))
+                .set("y", hundredths(self.top))
+                .set("width", hundredths(self.right - self.left))
+                .set("height", hundredths(self.bottom - self.top))
+                .set("fill", "none")
+                .set("stroke", INK)
+                .set("stroke-width", 1),
+        );
+        let mut mark =
+            |from: (f64, f64), to: (f64, f64)| group.append(segment([from, to], INK, 0.8));
+        let marks = |ruler: &Ruler| -> Vec<(f64, f64)> {
+            let labels = ruler.labels().into_iter().map(|(at, _)| (at, long));
+            labels
+                .chain(ruler.minor().into_iter().map(|at| (at, short)))
+                .collect()
+        };
+        for (at, length) in marks(&self.across) {
+            let x = self.x(at);
+            mark((x, self.bottom), (x, self.bottom - length));
+            mark((x, self.top), (x, self.top + length));
+        }
+        for (at, length) in marks(&self.up) {
+            let y = self.y(at);
+            mark((self.left, y), (self.left + length, y));
+            mark((self.right, y), (self.right - length, y));
+        }
+        for (at, label) in self.across.labels() {
+            group.append(text(
+                &label,
+                (self.x(at), self.bottom + 1.3 * font),
+                "middle",
+            ));
+        }
+        for (at, label) in self.up.labels() {
+            let place = (self.left - 0.5 * font, self.y(at) + 0.36 * font);
+            group.append(text(&label, place, "end"));
+        }
+        let middle = (0.5 * (self.left + self.right)).min(width);
+        let title = text(x_title, (middle, height - 0.8 * font), "middle");
+        group.append(title.set("font-size", hundredths(1.1 * font)));
+        let at = (1.4 * font, 0.5 * (self.top + self.bottom));
+        let turned = format!(
+            "translate({} {}) rotate(-90)",
+            hundredths(at.0),
+            hundredths(at.1)
+        );
+        group.append(
+            Text::new(y_title)
+                .set("transform", turned)
+                .set("text-anchor", "middle")
+                .set("font-size", hundredths(1.1 * font)),
+        );
+        group
+    }
+
+    fn curves(&self, curves: &[Curve], keys: &[Key]) -> Group {
+        let mut group = Group::new();
+        let keys: BTreeMap<&str, &Key> = keys.iter().map(|k| (k.label.as_str(), k)).collect();
+        for curve in curves {
+            let Some(key) = keys.get(curve.label.as_str()) else {
+                continue;
+            };
+            for (&(x, y), error) in curve.points.iter().zip(&curve.errors) {
+                let ends = [self.place((x, y - error)), self.place((x, y + error))];
+                if let [Some(a), Some(b)] = ends {
+                    group.append(segment([a, b], key.color, 1.5));
+                }
+            }
+            let points = self.points(curve);
+            if curve.mark == Mark::Dots {
+                for point in points {
+                    group.append(dot(point, key.color, self.font));
+                }
+                continue;
+            }
+            let points = points
+                .iter()
+                .map(|(x, y)| format!("{},{}", hundredths(*x), hundredths(*y)));
+            let line = Polyline::new()
+                .set("points", points.collect::<Vec<_>>().join(" "))
+                .set("fill", "none")
+                .set("stroke", key.color)
+                .set("stroke-width", 1.4)
+                .set("stroke-linejoin", "round");
+            group.append(match dashes(key, self.font) {
+                Some(dashes) => line.set("stroke-dasharray", dashes),
+                None => line,
             });
         }
-        Mark::Dots => {
-            series.legend(move |(x, y)| Circle::new((x + wide / 2, y), 4 * FINE, color.filled()));
+        group
+    }
+
+    /// The points of a curve that are drawn.
+    fn points(&self, curve: &Curve) -> Vec<(f64, f64)> {
+        let every = curve.points.len().div_ceil(POINTS).max(1);
+        let end = curve.points.len().saturating_sub(1);
+        let shown = (0..curve.points.len()).filter(|k| k % every == 0 || *k == end);
+        shown.filter_map(|k| self.place(curve.points[k])).collect()
+    }
+
+    /// The corner in which a legend lies on no curve.
+    fn free_corner(&self, curves: &[Curve], keys: &[Key]) -> Option<Corner> {
+        let (width, height) = key_size(keys, self.font);
+        let lines: Vec<Vec<(f64, f64)>> = curves.iter().map(|curve| self.points(curve)).collect();
+        Corner::ALL.into_iter().find(|corner| {
+            let (left, top) = self.corner(*corner, (width, height));
+            let around = 0.4 * self.font;
+            let within = |(x, y): (f64, f64)| {
+                x > left - around
+                    && x < left + width + around
+                    && y > top - around
+                    && y < top + height + around
+            };
+            !lines.iter().any(|line| trodden(line).any(within))
+        })
+    }
+
+    /// Where the upper left corner of something of this size is in a corner of the frame.
+    fn corner(&self, corner: Corner, (width, height): (f64, f64)) -> (f64, f64) {
+        let air = 0.9 * self.font;
+        let x = if corner.right {
+            self.right - air - width
+        } else {
+            self.left + air
+        };
+        let y = if corner.top {
+            self.top + air
+        } else {
+            self.bottom - air - height
+        };
+        (x, y)
+    }
+
+    /// Where the legend lies: in its corner, or beside the frame.
+    fn legend_at(&self, corner: Option<Corner>, keys: &[Key]) -> (f64, f64) {
+        match corner {
+            Some(corner) => self.corner(corner, key_size(keys, self.font)),
+            None => (self.right + 0.9 * self.font, self.top),
         }
     }
-    Ok(())
+}
+
+#[derive(Clone, Copy)]
+struct Corner {
+    right: bool,
+    top: bool,
+}
+
+impl Corner {
+    /// The first of those that are free is taken.
+    const ALL: [Self; 4] = [
+        Self::of(true, true),
+        Self::of(false, true),
+        Self::of(true, false),
+        Self::of(false, false),
+    ];
+
+    const fn of(right: bool, top: bool) -> Self {
+        Self { right, top }
+    }
+}
+
+/// Points along a line, every few pixels.
+fn trodden(line: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    const STEP: f64 = 4.0;
+    let pairs = line.windows(2).flat_map(|ends| {
+        let (a, b) = (ends[0], ends[1]);
+        let steps = (libm::hypot(b.0 - a.0, b.1 - a.1) / STEP) as usize;
+        (1..=steps).map(move |k| {
+            let part = k as f64 / (steps + 1) as f64;
+            (a.0 + part * (b.0 - a.0), a.1 + part * (b.1 - a.1))
+        })
+    });
+    line.iter().copied().chain(pairs)
+}
+
+fn text(words: &str, (x, y): (f64, f64), anchor: &str) -> Text {
+    Text::new(words)
+        .set("x", hundredths(x))
+        .set("y", hundredths(y))
+        .set("text-anchor", anchor)
+}
+
+fn segment([from, to]: [(f64, f64); 2], color: &str, width: f64) -> Line {
+    Line::new()
+        .set("x1", hundredths(from.0))
+        .set("y1", hundredths(from.1))
+        .set("x2", hundredths(to.0))
+        .set("y2", hundredths(to.1))
+        .set("stroke", color)
+        .set("stroke-width", width)
+}
+
+fn dot((x, y): (f64, f64), color: &str, font: f64) -> Circle {
+    Circle::new()
+        .set("cx", hundredths(x))
+        .set("cy", hundredths(y))
+        .set("r", hundredths(0.3 * font))
+        .set("fill", color)
+}
+
+/// Dashes and the gaps between them (pixels).
+fn dashes(key: &Key, font: f64) -> Option<String> {
+    let [dash, gap] = key.dash?;
+    Some(format!(
+        "{} {}",
+        hundredths(dash * font),
+        hundredths(gap * font)
+    ))
 }
 
 #[cfg(test)]

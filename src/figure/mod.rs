@@ -1,7 +1,7 @@
 //! Figures for papers and talks: a packing with its force chains, the fall of `f_max`, curves of what you like.
 //!
-//! A figure is SVG text; [`write()`] makes a PNG of it where the file's name asks for one, with a font of its own, so that
-//! a picture is the same on every machine.
+//! A figure is SVG text; [`write()`] makes a PDF or a PNG of it where the file's name asks for one, with a font of its own, so
+//! that a picture is the same on every machine. A length of 96 in the SVG is an inch on paper.
 //!
 //! ```
 //! use softjam::{figure::{Style, packing}, relax::Relaxation, scene::Scene};
@@ -15,13 +15,18 @@
 //! # std::fs::remove_file(&path).unwrap();
 //! ```
 
+mod axis;
 mod chart;
+mod legend;
 mod packing;
+mod pdf;
 mod relaxation;
+mod shades;
 
-pub use chart::{Axis, CURVE_COLORS, Curve, Mark, Scale, chart};
+pub use axis::{Axis, Scale};
+pub use chart::{CHART_WIDTH, CURVE_COLORS, Curve, Mark, chart, chart_in};
 pub use packing::{ColorBy, Shape, Style, packing};
-pub use relaxation::{Fall, relaxation};
+pub use relaxation::{Fall, relaxation, relaxation_in};
 
 use crate::record::{NewFile, RecordError};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
@@ -35,8 +40,14 @@ use crate::text::{lines, shown};
 /// The typeface of all figures.
 const FONT: &str = "DejaVu Sans";
 
-/// Pixels of a PNG for each unit of the SVG.
-const PIXELS: f32 = 2.0;
+/// What a browser takes: it has the same metrics where the typeface is missing.
+const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
+
+/// The colour of lines and text.
+const INK: &str = "#1c1c1c";
+
+/// Pixels of a PNG for each unit of the SVG: 300 an inch.
+const PIXELS: f32 = 3.125;
 
 /// Why a figure could not be made.
 ///
@@ -48,8 +59,8 @@ const PIXELS: f32 = 2.0;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// The file's name ends in neither `.svg` nor `.png`.
-    #[error("{}: a figure's name ends in .svg or .png", shown(.path))]
+    /// The file's name ends in none of `.svg`, `.pdf` and `.png`.
+    #[error("{}: a figure's name ends in .svg, .pdf or .png", shown(.path))]
     Name {
         /// Path of the file.
         path: String,
@@ -77,28 +88,36 @@ pub enum FigureError {
 ///
 /// # Errors
 ///
-/// [`FigureError::Name`] if it ends in neither `.svg` nor `.png`.
+/// [`FigureError::Name`] if it ends in none of `.svg`, `.pdf` and `.png`.
 ///
 /// ```
-/// assert!(softjam::figure::check_name("packing.svg").is_ok());
+/// assert!(softjam::figure::check_name("packing.pdf").is_ok());
 /// assert!(softjam::figure::check_name("packing.gif").is_err());
 /// ```
 pub fn check_name(path: impl AsRef<Path>) -> Result<(), FigureError> {
-    is_png(path.as_ref()).map(drop)
+    Kind::of(path.as_ref()).map(drop)
 }
 
-fn is_png(path: &Path) -> Result<bool, FigureError> {
-    let named = |e: &str| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e));
-    match (named("svg"), named("png")) {
-        (true, _) => Ok(false),
-        (_, true) => Ok(true),
-        _ => Err(FigureError::Name {
+/// What a figure is written as.
+#[derive(Clone, Copy)]
+enum Kind {
+    Svg,
+    Pdf,
+    Png,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Result<Self, FigureError> {
+        let named = |e: &str| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e));
+        let kinds = [("svg", Self::Svg), ("pdf", Self::Pdf), ("png", Self::Png)];
+        let kind = kinds.into_iter().find(|(e, _)| named(e));
+        kind.map(|(_, kind)| kind).ok_or_else(|| FigureError::Name {
             path: path.display().to_string(),
-        }),
+        })
     }
 }
 
-/// Writes a figure as its name says, `.svg` or `.png`; an existing file is replaced when the new one is whole.
+/// Writes a figure as its name says, `.svg`, `.pdf` or `.png`; an existing file is replaced when the new one is whole.
 ///
 /// # Errors
 ///
@@ -128,11 +147,13 @@ pub fn write(path: impl AsRef<Path>, svg: &str) -> Result<(), FigureError> {
 pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
     let path = file.path().to_owned();
     let path = path.as_path();
-    let bytes = if is_png(path)? {
-        png(svg)?
-    } else {
-        check_numbers(svg)?;
-        svg.as_bytes().to_vec()
+    let bytes = match Kind::of(path)? {
+        Kind::Png => png(svg)?,
+        Kind::Pdf => pdf(svg)?,
+        Kind::Svg => {
+            check_numbers(svg)?;
+            svg.as_bytes().to_vec()
+        }
     };
     let written = file.write_all(&bytes).and_then(|()| file.publish());
     written.map_err(|source| match source.kind() {
@@ -147,7 +168,26 @@ pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
     })
 }
 
-/// A figure as PNG.
+/// A figure as PDF, one page of its size; text is drawn as outlines.
+///
+/// # Errors
+///
+/// [`FigureError::Draw`] if `svg` is no picture, or has what no figure of this module has: images, gradients, filters, masks, and
+/// what can be seen through.
+///
+/// ```
+/// let pdf = softjam::figure::pdf("<svg xmlns='http://www.w3.org/2000/svg' width='96' height='48'/>").unwrap();
+/// assert!(pdf.starts_with(b"%PDF-"));
+/// // An inch is 72 points.
+/// assert!(pdf.windows(23).any(|bytes| bytes == b"/MediaBox [0 0 72 36]\n "));
+/// ```
+pub fn pdf(svg: &str) -> Result<Vec<u8>, FigureError> {
+    let tree = tree(svg)?;
+    let problem = |what| FigureError::Draw(format!("a PDF of softjam cannot hold {what}"));
+    pdf::pdf(&tree).map_err(problem)
+}
+
+/// A figure as PNG, 300 pixels an inch.
 ///
 /// # Errors
 ///
@@ -158,22 +198,12 @@ pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
 /// assert!(png.starts_with(b"\x89PNG"));
 /// ```
 pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
-    check_numbers(svg)?;
-    let mut options = Options {
-        font_family: FONT.to_owned(),
-        ..Options::default()
-    };
-    let fonts = options.fontdb_mut();
-    for font in [dejavu::sans::regular(), dejavu::sans::oblique()] {
-        fonts.load_font_data(font.to_vec());
-    }
-    fonts.set_sans_serif_family(FONT);
+    let tree = tree(svg)?;
     let draw = |e: &dyn std::fmt::Display| FigureError::Draw(e.to_string());
-    let tree = Tree::from_str(svg, &options).map_err(|e| draw(&e))?;
     let (width, height) = (tree.size().width(), tree.size().height());
     if width.max(height) > LONGEST_SIDE {
         return Err(draw(&format!(
-            "{width:.0} × {height:.0} is too long for a PNG; name a file that ends in .svg"
+            "{width:.0} × {height:.0} is too long for a PNG; name a file that ends in .svg or .pdf"
         )));
     }
     let size = tree.size().to_int_size().scale_by(PIXELS);
@@ -190,11 +220,26 @@ pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     pixels.encode_png().map_err(|e| draw(&e))
 }
 
-/// Units of the longest side of a PNG.
-const LONGEST_SIDE: f32 = 20_000.0;
+/// The shapes of a figure, its text in our typeface.
+fn tree(svg: &str) -> Result<Tree, FigureError> {
+    check_numbers(svg)?;
+    let mut options = Options {
+        font_family: FONT.to_owned(),
+        ..Options::default()
+    };
+    let fonts = options.fontdb_mut();
+    for font in [dejavu::sans::regular(), dejavu::sans::oblique()] {
+        fonts.load_font_data(font.to_vec());
+    }
+    fonts.set_sans_serif_family(FONT);
+    Tree::from_str(svg, &options).map_err(|e| FigureError::Draw(e.to_string()))
+}
 
-/// Refuses a figure with places or sizes that are no numbers, or with such a force in its caption: forces or lengths beyond what a number
-/// can hold.
+/// Units of the longest side of a PNG.
+const LONGEST_SIDE: f32 = 12_800.0;
+
+/// Refuses a figure with places or sizes that are no numbers, or with such a force or squeeze in what stands below it: forces or
+/// lengths beyond what a number can hold.
 fn check_numbers(svg: &str) -> Result<(), FigureError> {
     let none = |text: &str, around: [&str; 2]| {
         let [before, behind] = around;
@@ -205,7 +250,11 @@ fn check_numbers(svg: &str) -> Result<(), FigureError> {
     let mut parts = svg
         .split('<')
         .map(|part| part.split_once('>').unwrap_or((part, "")));
-    if parts.any(|(tag, text)| none(tag, ["", ""]) || none(text, [" = ", " γ"])) {
+    let said = |text: &str| {
+        let around = [["= ", " γ"], ["up to ", ","], ["mean ", ","]];
+        around.into_iter().any(|around| none(text, around))
+    };
+    if parts.any(|(tag, text)| none(tag, ["", ""]) || said(text)) {
         let problem = "forces or lengths are beyond what a number can hold".to_owned();
         return Err(FigureError::Draw(problem));
     }
@@ -226,12 +275,25 @@ fn decade(k: i32) -> String {
     format!("10{}", superscript(&k.to_string()))
 }
 
-/// `f_max` in SVG as it is printed, in a text of the given font size.
-fn f_max(size: u32) -> String {
-    let (small, down) = (7 * size / 10, size / 5);
-    format!(
-        "<tspan font-style=\"italic\">f</tspan><tspan font-size=\"{small}\" dy=\"{down}\">max</tspan><tspan dy=\"-{down}\">\u{2009}</tspan>"
-    )
+/// The size of text in a figure of this width (pixels): 8 points in one column of a journal, 10 in two.
+fn font_size(width: f64) -> f64 {
+    (width / 50.0).clamp(8.0 / 0.75, 10.0 / 0.75)
+}
+
+/// Each `f_max` of an SVG as it is printed, in text of the given font size.
+fn with_f_max(svg: &str, size: f64) -> String {
+    let (small, down) = (
+        shades::hundredths(0.7 * size),
+        shades::hundredths(0.2 * size),
+    );
+    let printed = |behind: &str| {
+        format!(
+            "<tspan font-style=\"italic\">f</tspan><tspan font-size=\"{small}\" dy=\"{down}\">max</tspan><tspan dy=\"-{down}\">{behind}</tspan>"
+        )
+    };
+    // What stands behind it goes back to the line; a space that no reader collapses, or a hair's breadth.
+    svg.replace("f_max ", &printed("\u{a0}"))
+        .replace("f_max", &printed("\u{200a}"))
 }
 
 /// A whole number as an exponent.

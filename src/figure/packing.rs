@@ -1,16 +1,20 @@
 //! A packing: particles as filled contours, contacts as force chains.
 
-use super::{FONT, f_max, power_of_ten};
+use super::legend::{Legend, length};
+use super::shades::{PALE, Shades, hundredths};
+use super::{FONTS, INK, font_size, power_of_ten, with_f_max};
 use crate::contact::{Contacts, FrameContacts};
 use crate::domain::{Domain, Vec2};
 use crate::droplet::contour::{ContourStyle, Contours, Placement};
-use crate::force::{held, largest_force, net_forces};
+use crate::droplet::validity::Validity;
+use crate::force::{largest_force, net_forces};
 use crate::frame::Frame;
 use crate::packing::Packing;
+use crate::text::counted;
 use core::f64::consts::PI;
 use svg::node::element::path::Data;
-use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Path, Rectangle, Text};
-use svg::{Document, Node};
+use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Path, Rectangle};
+use svg::{Document, Node as _};
 
 /// What a particle is drawn as.
 ///
@@ -59,8 +63,11 @@ pub struct Style {
     pub color: ColorBy,
     /// Whether contacts are drawn, their width by the force.
     pub chains: bool,
-    /// Width of the box (pixels of the SVG).
+    /// Width of the figure (pixels of the SVG, 96 an inch); text is 8 points in narrow figures and 10 in wide ones.
     pub width: f64,
+    /// The values at the ends of the colour bar, ascending; without them round numbers around the values of all but the last
+    /// fiftieth of the particles at either end.
+    pub range: Option<[f64; 2]>,
 }
 
 impl Default for Style {
@@ -69,17 +76,26 @@ impl Default for Style {
             shape: Shape::default(),
             color: ColorBy::default(),
             chains: true,
-            width: 640.0,
+            width: 668.0,
+            range: None,
         }
     }
 }
 
 /// How far the chords of a contour are off (pixels).
 const CHORD: f64 = 0.05;
-const INK: &str = "#1c1c1c";
 const MARGIN: f64 = 14.0;
+/// The width of a chain that bears the mean force: in mean radii, and at most in pixels.
+const CHAIN: (f64, f64) = (0.08, 2.2);
+/// The force above which chains become no wider (means).
+const STRONGEST: f64 = 3.0;
+/// The width of an outline, likewise.
+const OUTLINE: (f64, f64) = (0.03, 1.2);
 
 /// Draws `frame`; `packing` gives radii and box, `line_tension` is γ (force).
+///
+/// Below the packing stand its numbers, what colours and lines mean, and, where more of the model is shown than positions, the
+/// [warning](Validity::warning) of a packing that is beyond the model's range.
 ///
 /// See the example of the [module](super).
 #[must_use]
@@ -87,56 +103,46 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
     let contacts = FrameContacts::of(packing, frame);
     let contacts = contacts.view();
     let sheet = Sheet::of(packing.domain(), style.width);
+    let radius = mean(packing.radii());
     let mut contours = Contours::new(ContourStyle {
-        vertices: vertices(sheet.scale * mean(packing.radii())),
+        vertices: vertices(sheet.scale * radius),
         placement: Placement::Contacts,
     });
     contours.draw(packing.radii(), &frame.positions, &contacts, line_tension);
-    let shades = Shades::of(style.color, packing.radii(), frame, &contacts, &contours);
+    let coloring = (style.color, style.range);
+    let shades = Shades::of(coloring, packing.radii(), frame, &contacts, &contours);
 
-    let thin = sheet.pixels(0.03 * mean(packing.radii()));
-    let (mut particles, mut outlines) = (Group::new(), Group::new());
-    for (p, (&center, &radius)) in frame.positions.iter().zip(packing.radii()).enumerate() {
-        match style.shape {
-            Shape::Contour => {
-                let outline = contours.polygon(p);
-                for shift in sheet.images(outline) {
-                    let points = outline.iter().map(|v| sheet.place(v + shift));
-                    particles.append(polygon(points).set("fill", shades.fill(p)));
-                }
-            }
-            // Disks overlap: the outlines lie above all of them, so that the overlaps can be seen.
-            Shape::Disk => {
-                let corner = Vec2::repeat(radius);
-                for shift in sheet.images(&[center - corner, center + corner]) {
-                    let (x, y) = sheet.place(center + shift);
-                    let disk = Circle::new()
-                        .set("cx", x)
-                        .set("cy", y)
-                        .set("r", sheet.pixels(radius));
-                    outlines.append(disk.clone());
-                    particles.append(disk.set("fill", shades.fill(p)));
-                }
-            }
-        }
+    let thin = hundredths((OUTLINE.0 * radius * sheet.scale).min(OUTLINE.1));
+    let particles = particles(&sheet, (packing, frame), style.shape, &contours, &shades);
+    let mut inside = Group::new()
+        .set("clip-path", "url(#box)")
+        .add(particles.set("stroke-width", thin));
+    let chains = Chains::of(&sheet, radius, &contacts).filter(|_| style.chains);
+    if let Some(chains) = &chains {
+        inside.append(chains.draw(&sheet, frame, &contacts));
     }
-    let drawn = |group: Group| {
-        group
-            .set("stroke", INK)
-            .set("stroke-width", thin)
-            .set("stroke-linejoin", "round")
-    };
-    let particles = match style.shape {
-        Shape::Contour => drawn(particles),
-        Shape::Disk => Group::new()
-            .add(particles)
-            .add(drawn(outlines).set("fill", "none")),
-    };
-    let mut inside = Group::new().set("clip-path", "url(#box)").add(particles);
-    if style.chains && !contacts.forces.is_empty() {
-        inside.append(chains(&sheet, frame, packing.radii(), &contacts));
-    }
+
     let (x, y, width, height) = sheet.frame();
+    let mut legend = Legend::new((x, y + height + 6.0), width, font_size(style.width));
+    let pieces = caption(packing, frame, &contacts, (line_tension, style.shape));
+    legend.lines(&pieces, ", ", 1.0);
+    shades.bar(&mut legend);
+    if let Some(chains) = &chains {
+        chains.key(&mut legend);
+    }
+    if shades.rattlers() > 0 {
+        rattlers(shades.rattlers(), thin, &mut legend);
+    }
+    let of_the_model =
+        style.shape == Shape::Contour || chains.is_some() || style.color != ColorBy::Nothing;
+    let validity = Validity::of(&contacts, packing.len(), line_tension);
+    if let Some(warning) = validity.warning().filter(|_| of_the_model) {
+        let words: Vec<String> = warning.split(' ').map(str::to_owned).collect();
+        legend.lines(&words, " ", 0.75);
+    }
+    let (legend, end) = legend.end();
+
+    let total = (hundredths(style.width), (end + 10.0).ceil());
     let outline = || {
         Rectangle::new()
             .set("x", x)
@@ -145,14 +151,11 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
             .set("height", height)
     };
     let clip = ClipPath::new().set("id", "box").add(outline());
-    let total = (sheet.width + shades.room(), sheet.height + 26.0);
-    let document = Document::new()
-        .set("viewBox", (0, 0, total.0.ceil(), total.1.ceil()))
-        .set("width", total.0.ceil())
-        .set("height", total.1.ceil())
-        .set("font-family", FONT)
-        .set("font-size", 13)
-        .set("fill", INK)
+    let svg = Document::new()
+        .set("viewBox", (0, 0, total.0, total.1))
+        .set("width", total.0)
+        .set("height", total.1)
+        .set("font-family", FONTS)
         .add(Definitions::new().add(clip))
         // Paper, so that the ink can be read on a dark page too.
         .add(
@@ -168,13 +171,85 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
                 .set("stroke", INK)
                 .set("stroke-width", 1.2),
         )
-        .add(
-            Text::new(caption(packing, frame, &contacts, line_tension))
-                .set("x", x)
-                .set("y", y + height + 22.0),
-        );
-    let svg = shades.legend(document, &sheet).to_string();
-    svg.replace("f_max", &f_max(13))
+        .add(legend)
+        .to_string();
+    symbols(&svg, font_size(style.width))
+}
+
+/// Physical quantities in italics, as they are printed.
+fn symbols(svg: &str, size: f64) -> String {
+    const QUANTITIES: [&str; 5] = ["N =", "φ =", "p / ⟨p⟩", "f / ⟨f⟩", "|ΔR| / R"];
+    let italic = |text: &str| {
+        let letter = |c: char| c.is_alphabetic() && c != 'Δ';
+        let words = text.chars().map(|c| match c {
+            c if letter(c) => format!("<tspan font-style=\"italic\">{c}</tspan>"),
+            c => c.to_string(),
+        });
+        words.collect::<String>()
+    };
+    QUANTITIES
+        .iter()
+        .fold(with_f_max(svg, size), |svg, quantity| {
+            svg.replace(quantity, &italic(quantity))
+        })
+}
+
+/// The particles, filled, with their outlines; of disks, which overlap, the outlines lie above all of them.
+fn particles(
+    sheet: &Sheet,
+    (packing, frame): (&Packing, &Frame),
+    shape: Shape,
+    contours: &Contours,
+    shades: &Shades,
+) -> Group {
+    let (mut particles, mut outlines) = (Group::new(), Group::new());
+    for (p, (&center, &radius)) in frame.positions.iter().zip(packing.radii()).enumerate() {
+        match shape {
+            Shape::Contour => {
+                let outline = contours.polygon(p);
+                for shift in sheet.images(outline) {
+                    let points = outline.iter().map(|v| sheet.place(v + shift));
+                    particles.append(polygon(points).set("fill", shades.fill(p)));
+                }
+            }
+            Shape::Disk => {
+                let corner = Vec2::repeat(radius);
+                for shift in sheet.images(&[center - corner, center + corner]) {
+                    let (x, y) = sheet.place(center + shift);
+                    let disk = Circle::new()
+                        .set("cx", x)
+                        .set("cy", y)
+                        .set("r", sheet.pixels(radius));
+                    outlines.append(disk.clone());
+                    particles.append(disk.set("fill", shades.fill(p)));
+                }
+            }
+        }
+    }
+    let drawn = |group: Group| group.set("stroke", INK).set("stroke-linejoin", "round");
+    match shape {
+        Shape::Contour => drawn(particles),
+        Shape::Disk => Group::new()
+            .add(particles)
+            .add(drawn(outlines).set("fill", "none")),
+    }
+}
+
+/// The colour that says of a particle that it rattles.
+fn rattlers(count: usize, outline: f64, legend: &mut Legend) {
+    let font = legend.font();
+    let text = counted(count, "rattler");
+    let (left, middle) = legend.place((length(&text) + 1.7, 1.8));
+    legend.add(
+        Circle::new()
+            .set("cx", hundredths(left + 0.6 * font))
+            .set("cy", hundredths(middle))
+            .set("r", hundredths(0.6 * font))
+            .set("fill", PALE)
+            .set("stroke", INK)
+            .set("stroke-width", outline),
+    );
+    legend.write(&text, (left + 1.7 * font, middle), "start");
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -200,62 +275,112 @@ fn polygon(points: impl Iterator<Item = (f64, f64)>) -> Path {
     Path::new().set("d", data.close())
 }
 
-/// Widths go with the force, up to three means.
-fn chains(sheet: &Sheet, frame: &Frame, radii: &[f64], contacts: &Contacts<'_>) -> Group {
-    let strongest = 3.0;
-    let average = mean(contacts.forces);
-    let widest = sheet.pixels(0.08 * mean(radii));
-    let mut group = Group::new()
-        .set("stroke", INK)
-        .set("stroke-linecap", "round");
-    for (c, &[i, _]) in contacts.pairs.iter().enumerate() {
-        let from = frame.positions[i as usize];
-        let ends = [from, from - contacts.normals[c] * contacts.distances[c]];
-        let relative = (contacts.forces[c] / average).clamp(0.0, strongest);
-        for shift in sheet.images(&ends) {
-            let [(x1, y1), (x2, y2)] = ends.map(|v| sheet.place(v + shift));
-            group.append(
-                Line::new()
-                    .set("x1", x1)
-                    .set("y1", y1)
-                    .set("x2", x2)
-                    .set("y2", y2)
-                    .set("stroke-width", hundredths(widest * relative)),
-            );
-        }
-    }
-    group
+/// The force chains: lines between centres whose width goes with the force, up to [`STRONGEST`].
+struct Chains {
+    average: f64,
+    /// Width of a line that bears the mean force (pixels).
+    usual: f64,
+    /// Whether a force is above [`STRONGEST`].
+    beyond: bool,
 }
 
-fn caption(packing: &Packing, frame: &Frame, contacts: &Contacts<'_>, line_tension: f64) -> String {
+impl Chains {
+    /// Nothing where no contact bears a force.
+    fn of(sheet: &Sheet, radius: f64, contacts: &Contacts<'_>) -> Option<Self> {
+        let average = mean(contacts.forces);
+        (average > 0.0).then(|| Self {
+            average,
+            usual: (CHAIN.0 * radius * sheet.scale).min(CHAIN.1),
+            beyond: contacts.forces.iter().any(|f| *f > STRONGEST * average),
+        })
+    }
+
+    fn draw(&self, sheet: &Sheet, frame: &Frame, contacts: &Contacts<'_>) -> Group {
+        let mut group = Group::new()
+            .set("stroke", INK)
+            .set("stroke-linecap", "round");
+        for (c, &[i, _]) in contacts.pairs.iter().enumerate() {
+            let from = frame.positions[i as usize];
+            let ends = [from, from - contacts.normals[c] * contacts.distances[c]];
+            let relative = (contacts.forces[c] / self.average).clamp(0.0, STRONGEST);
+            for shift in sheet.images(&ends) {
+                let [(x1, y1), (x2, y2)] = ends.map(|v| sheet.place(v + shift));
+                group.append(
+                    Line::new()
+                        .set("x1", x1)
+                        .set("y1", y1)
+                        .set("x2", x2)
+                        .set("y2", y2)
+                        .set("stroke-width", hundredths(self.usual * relative)),
+                );
+            }
+        }
+        group
+    }
+
+    /// Lines of three forces, with what they are in means.
+    fn key(&self, legend: &mut Legend) {
+        let (font, title) = (legend.font(), "f / ⟨f⟩");
+        let most = if self.beyond { "≥ 3" } else { "3" };
+        let samples = [(0.5, "0.5"), (1.0, "1"), (STRONGEST, most)];
+        let (line, gap) = (2.0, 0.5);
+        let mut x = length(title) + gap;
+        let each = samples.map(|(_, label)| line + gap + length(label) + gap);
+        let (left, middle) = legend.place((x + each.iter().sum::<f64>(), 1.8));
+        legend.write(title, (left, middle), "start");
+        for ((relative, label), room) in samples.into_iter().zip(each) {
+            legend.add(
+                Line::new()
+                    .set("x1", hundredths(left + x * font))
+                    .set("x2", hundredths(left + (x + line) * font))
+                    .set("y1", hundredths(middle))
+                    .set("y2", hundredths(middle))
+                    .set("stroke", INK)
+                    .set("stroke-width", hundredths(self.usual * relative)),
+            );
+            legend.write(label, (left + (x + line + gap) * font, middle), "start");
+            x += room;
+        }
+    }
+}
+
+/// What the picture is of.
+fn caption(
+    packing: &Packing,
+    frame: &Frame,
+    contacts: &Contacts<'_>,
+    (line_tension, shape): (f64, Shape),
+) -> Vec<String> {
     let mut net = vec![Vec2::zeros(); packing.len()];
     net_forces(contacts, &mut net);
     let largest = largest_force(&net) / line_tension;
-    format!(
-        "N = {}, φ = {:.3}, step {}, f_max = {} γ",
-        packing.len(),
-        packing.coverage(),
-        frame.step,
-        power_of_ten(largest)
-    )
+    let mut pieces = vec![
+        format!("N = {}", packing.len()),
+        format!("φ = {:.3}", packing.coverage()),
+        format!("step {}", frame.step),
+        format!("f_max = {} γ", power_of_ten(largest)),
+    ];
+    if shape == Shape::Disk {
+        pieces.push("undeformed disks".to_owned());
+    }
+    pieces
 }
 
 /// Where the box lies on the sheet.
 struct Sheet {
     scale: f64,
     lengths: Vec2,
-    width: f64,
     height: f64,
 }
 
 impl Sheet {
+    /// `width` is that of the whole figure.
     fn of(domain: Domain, width: f64) -> Self {
         let lengths = domain.lengths();
-        let scale = width / lengths.x;
+        let scale = (width - 2.0 * MARGIN) / lengths.x;
         Self {
             scale,
             lengths,
-            width: width + 2.0 * MARGIN,
             height: scale * lengths.y + 2.0 * MARGIN,
         }
     }
@@ -295,132 +420,5 @@ impl Sheet {
             }
         }
         shifts
-    }
-}
-
-fn hundredths(x: f64) -> f64 {
-    libm::round(100.0 * x) / 100.0
-}
-
-/// The colours of the particles and what they mean.
-struct Shades {
-    values: Vec<f64>,
-    held: Vec<bool>,
-    most: f64,
-    title: &'static str,
-    percent: bool,
-}
-
-impl Shades {
-    fn of(
-        color: ColorBy,
-        radii: &[f64],
-        frame: &Frame,
-        contacts: &Contacts<'_>,
-        contours: &Contours,
-    ) -> Self {
-        let held = held(radii.len(), contacts.pairs);
-        let (values, most, title, percent) = match color {
-            ColorBy::Pressure => {
-                let mut pressure = vec![0.0; radii.len()];
-                for (&[i, j], f) in contacts.pairs.iter().zip(contacts.forces) {
-                    pressure[i as usize] += f / (2.0 * PI * radii[i as usize]);
-                    pressure[j as usize] += f / (2.0 * PI * radii[j as usize]);
-                }
-                let pressed = pressure.iter().filter(|p| **p > 0.0).count().max(1);
-                let average = pressure.iter().sum::<f64>() / pressed as f64;
-                if average > 0.0 {
-                    for p in &mut pressure {
-                        *p /= average;
-                    }
-                }
-                (pressure, 2.0, "p / ⟨p⟩", false)
-            }
-            ColorBy::Deformation => {
-                let deformation = |p: usize| {
-                    let off = contours
-                        .polygon(p)
-                        .iter()
-                        .map(|v| ((v - frame.positions[p]).norm() / radii[p] - 1.0).abs());
-                    off.fold(0.0, f64::max)
-                };
-                let values: Vec<f64> = (0..radii.len()).map(deformation).collect();
-                let most = values.iter().fold(0.0, |m: f64, v| m.max(*v));
-                (values, most.max(1e-12), "max |ΔR| / R", true)
-            }
-            ColorBy::Nothing => (Vec::new(), 1.0, "", false),
-        };
-        Self {
-            values,
-            held,
-            most,
-            title,
-            percent,
-        }
-    }
-
-    /// The colour of a value between 0 and `most`: viridis, light enough for black chains on it.
-    fn shade(&self, value: f64) -> String {
-        let c = colorous::VIRIDIS.eval_continuous(0.08 + 0.9 * (value / self.most).clamp(0.0, 1.0));
-        let light = |part: u8| (0.62 * f64::from(part) + 0.38 * 255.0) as u8;
-        format!("#{:02x}{:02x}{:02x}", light(c.r), light(c.g), light(c.b))
-    }
-
-    fn fill(&self, p: usize) -> String {
-        match self.values.get(p) {
-            _ if !self.held[p] => "#f4f4f4".to_owned(),
-            Some(value) => self.shade(*value),
-            None => "#cfdfe8".to_owned(),
-        }
-    }
-
-    /// Width that the legend takes.
-    fn room(&self) -> f64 {
-        if self.values.is_empty() { 0.0 } else { 100.0 }
-    }
-
-    /// A colour bar at the right.
-    fn legend(&self, document: Document, sheet: &Sheet) -> Document {
-        const STEPS: usize = 64;
-        if self.values.is_empty() {
-            return document;
-        }
-        let (_, top, _, box_height) = sheet.frame();
-        let (left, height) = (sheet.width + 6.0, 0.6 * box_height);
-        let top = top + 0.2 * box_height;
-        let mut bar = Group::new();
-        for k in 0..STEPS {
-            let value = self.most * (k as f64 + 0.5) / STEPS as f64;
-            let step = height / STEPS as f64;
-            bar.append(
-                Rectangle::new()
-                    .set("x", left)
-                    .set("y", hundredths(top + height - (k + 1) as f64 * step))
-                    .set("width", 16)
-                    // A little more, so that no light shows between.
-                    .set("height", hundredths(step + 0.6))
-                    .set("fill", self.shade(value)),
-            );
-        }
-        for part in [0.0, 0.5, 1.0] {
-            let value = self.most * part;
-            let label = if self.percent {
-                format!("{:.1} %", 100.0 * value)
-            } else {
-                let beyond = part == 1.0 && self.values.iter().any(|v| *v > self.most);
-                format!("{}{value}", if beyond { "≥ " } else { "" })
-            };
-            bar.append(
-                Text::new(label)
-                    .set("x", left + 22.0)
-                    .set("y", hundredths(top + height * (1.0 - part) + 4.5)),
-            );
-        }
-        bar.append(
-            Text::new(self.title)
-                .set("x", left)
-                .set("y", hundredths(top - 12.0)),
-        );
-        document.add(bar)
     }
 }

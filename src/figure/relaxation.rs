@@ -1,6 +1,6 @@
-//! The fall of `f_max` with the number of steps: the seed's figure 6.
+//! The fall of `f_max` with the number of steps: Saitoh's figure 6.
 
-use super::{Axis, Curve, FigureError, Mark, Scale, chart};
+use super::{Axis, CHART_WIDTH, Curve, FigureError, Mark, Scale, chart_in};
 
 /// The fall of `f_max` in one run.
 ///
@@ -33,6 +33,22 @@ const LEAST: f64 = 1e-18;
 ///
 /// See the example of [`Fall`].
 pub fn relaxation(runs: &[Fall]) -> Result<String, FigureError> {
+    relaxation_in(CHART_WIDTH, runs)
+}
+
+/// [`relaxation`] of the given width (pixels of the SVG, 96 an inch); text is 8 points in narrow figures and 10 in wide ones.
+///
+/// # Errors
+///
+/// As [`relaxation`].
+///
+/// ```
+/// use softjam::figure::{Fall, relaxation_in};
+///
+/// let run = Fall { points: vec![(0, 1e-1), (9, 1e-9)], ..Fall::default() };
+/// assert!(relaxation_in(325.0, &[run]).unwrap().contains("width=\"325\""));
+/// ```
+pub fn relaxation_in(width: f64, runs: &[Fall]) -> Result<String, FigureError> {
     let steps = runs.iter().flat_map(|run| run.points.iter().map(|p| p.0));
     let nothing = || FigureError::Nothing("there is no f_max to draw".to_owned());
     let last = steps.max().ok_or_else(nothing)?;
@@ -60,7 +76,8 @@ pub fn relaxation(runs: &[Fall]) -> Result<String, FigureError> {
         title: title.to_owned(),
         scale,
     };
-    chart(
+    chart_in(
+        width,
         &axis("step", Scale::Linear),
         &axis("f_max / γ", Scale::Logarithmic),
         &curves,

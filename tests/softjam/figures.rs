@@ -2,7 +2,9 @@
 
 use softjam::contact::ContactLaw;
 use softjam::domain::{Domain, Vec2};
-use softjam::figure::{ColorBy, Fall, Shape, Style, packing as draw, png, relaxation};
+use softjam::figure::{
+    Axis, ColorBy, Curve, Fall, Shape, Style, chart, packing as draw, pdf, png, relaxation,
+};
 use softjam::frame::Frame;
 use softjam::packing::Packing;
 use softjam::relax::Relaxation;
@@ -45,7 +47,7 @@ fn a_particle_is_drawn_on_every_side_of_the_box_that_it_reaches() {
             &frame_of(&packing),
             1.0,
             &Style {
-                width: 1000.0,
+                width: 1028.0,
                 ..Style::default()
             },
         );
@@ -77,7 +79,7 @@ fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
     let drawn = |shape| {
         let style = Style {
             shape,
-            width: 1000.0,
+            width: 1028.0,
             color: ColorBy::Nothing,
             ..Style::default()
         };
@@ -96,7 +98,12 @@ fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
     assert!(disks.contains("r=\"50\""), "{disks}");
     assert!(contour < disk - 5.0 && contour > 14.0 + 495.0, "{contour}");
     let svg = drawn(Shape::Contour);
-    assert_eq!(svg.matches("<line").count(), 1, "one contact, one chain");
+    let inside = svg
+        .split("url(#box)")
+        .nth(1)
+        .and_then(|rest| rest.split("<text").next());
+    let chains = inside.map(|inside| inside.matches("<line").count());
+    assert_eq!(chains, Some(1), "one contact, one chain");
     assert!(
         svg.contains("x1=\"474\"") && svg.contains("x2=\"554\""),
         "{svg}"
@@ -115,7 +122,120 @@ fn rattlers_are_pale_and_the_pressed_are_coloured() {
     let svg = draw(run.packing(), &run.frame(), 1.0, &Style::default());
     let pale = svg.matches("#f4f4f4").count();
     assert!(rattlers > 0 && pale >= rattlers, "{pale} of {rattlers}");
-    assert!(svg.contains("p / ⟨p⟩"));
+    assert!(svg.contains("</tspan> / ⟨"));
+    let key = format!("{rattlers} rattler");
+    assert!(svg.contains(&key), "{key}");
+}
+
+fn drawn(phi: f64, style: &Style) -> String {
+    let run = Relaxation::new(&Scene {
+        particles: 100,
+        phi,
+        ..Scene::default()
+    })
+    .unwrap();
+    draw(run.packing(), &run.frame(), 1.0, style)
+}
+
+#[test]
+fn a_packing_beyond_the_range_of_the_model_says_so_where_more_than_positions_is_drawn() {
+    let warned = |svg: &str| svg.contains("particles are squeezed beyond the range");
+    assert!(!warned(&drawn(0.845, &Style::default())));
+    assert!(warned(&drawn(1.0, &Style::default())));
+    let plain = Style {
+        color: ColorBy::Nothing,
+        chains: false,
+        ..Style::default()
+    };
+    assert!(warned(&drawn(1.0, &plain)));
+    let shape = Shape::Disk;
+    let disks = drawn(1.0, &Style { shape, ..plain });
+    assert!(!warned(&disks) && disks.contains("undeformed disks"));
+}
+
+#[test]
+fn particles_that_differ_differ_in_colour_and_a_given_range_is_kept() {
+    let colors = |range| {
+        let svg = drawn(
+            1.0,
+            &Style {
+                range,
+                ..Style::default()
+            },
+        );
+        let inside = svg.split("url(#box)").nth(1).unwrap();
+        let inside = inside.split("<text").next().unwrap().to_owned();
+        let fills = inside.split("fill=\"#").skip(1).map(|rest| &rest[..6]);
+        let green = fills.map(|rgb| u8::from_str_radix(&rgb[2..4], 16).unwrap());
+        let green: Vec<u8> = green.collect();
+        (
+            svg,
+            green.iter().max().unwrap() - green.iter().min().unwrap(),
+        )
+    };
+    let (_, own) = colors(None);
+    let (svg, wide) = colors(Some([0.0, 2.0]));
+    assert!(
+        own > 2 * wide - wide / 2,
+        "{own} against {wide} from 0 to 2"
+    );
+    for number in ["\n0\n", "\n1\n", "\n2\n"] {
+        assert!(svg.contains(number), "{number:?}");
+    }
+    let (svg, _) = colors(Some([0.9, 1.1]));
+    assert!(svg.contains("\n≤ 0.9\n") && svg.contains("\n≥ 1.1\n"));
+}
+
+#[test]
+fn a_pdf_is_a_page_of_the_size_of_the_figure_and_the_same_every_time() {
+    let svg = drawn(
+        0.9,
+        &Style {
+            width: 325.0,
+            ..Style::default()
+        },
+    );
+    let bytes = pdf(&svg).unwrap();
+    assert!(bytes.starts_with(b"%PDF-") && bytes.ends_with(b"%%EOF"));
+    assert_eq!(bytes, pdf(&svg).unwrap());
+    let page = b"/MediaBox [0 0 243.75 ";
+    assert!(bytes.windows(page.len()).any(|part| part == page));
+    let image = "<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'><rect width='9' height='9' fill-opacity='.5'/></svg>";
+    let refused = pdf(image).unwrap_err().to_string();
+    assert!(refused.contains("seen through"), "{refused}");
+}
+
+#[test]
+fn a_legend_lies_on_no_curve() {
+    let curve = |label: &str, ys: [f64; 4]| Curve {
+        label: label.to_owned(),
+        points: (0..4).map(|k| (f64::from(k), ys[k as usize])).collect(),
+        ..Curve::default()
+    };
+    let frame_and_key = |curves: &[Curve]| {
+        let svg = chart(&Axis::default(), &Axis::default(), curves).unwrap();
+        let number = |tag: &str, name: &str| -> f64 {
+            let rest = tag.split(&format!(" {name}=\"")).nth(1).unwrap();
+            rest[..rest.find('"').unwrap()].parse().unwrap()
+        };
+        let frame = svg.split("<rect").nth(2).unwrap();
+        let frame_end = number(frame, "x") + number(frame, "width");
+        let key = svg.split("<line").last().unwrap();
+        (frame_end, number(key, "x1"), number(key, "y1"))
+    };
+    let (end, x, y) = frame_and_key(&[curve("down", [3.0, 1.0, 0.5, 0.0])]);
+    assert!(
+        x < end && x > 0.5 * end && y < 200.0,
+        "upper right: {x} {y}"
+    );
+    let (end, x, y) = frame_and_key(&[curve("up", [0.0, 0.5, 1.0, 3.0])]);
+    assert!(x < 0.5 * end && y < 200.0, "upper left: {x} {y}");
+    let both = [
+        curve("rising", [0.0, 1.0, 2.0, 3.0]),
+        curve("falling", [3.0, 2.0, 1.0, 0.0]),
+    ];
+    let (end, x, _) = frame_and_key(&both);
+    assert!(x > end, "beside the frame: {x} {end}");
 }
 
 #[test]
@@ -128,8 +248,8 @@ fn a_figure_is_a_picture_of_its_size() {
     let svg = draw(run.packing(), &run.frame(), 1.0, &Style::default());
     let bytes = png(&svg).unwrap();
     let size = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
-    // 640 + two margins + the legend, in twice as many pixels.
-    assert_eq!(size(16), 2 * (640 + 28 + 100));
+    // 640 + two margins, 300 pixels an inch of 96.
+    assert_eq!(size(16), (668 * 300_u32).div_ceil(96));
     assert!(png("<svg").is_err());
 }
 

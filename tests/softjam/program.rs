@@ -73,8 +73,13 @@ fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
     record(folder.path(), "a.rrd", &[]);
     record(folder.path(), "b.mcap", &["--seed", "2"]);
     record(folder.path(), "m.rrd", &["--channels", "metrics"]);
-    let drawn: [&[&str]; 4] = [
+    let drawn: [&[&str]; 7] = [
         &["a.rrd", "-o", "a.svg"],
+        &[
+            "a.rrd", "--width", "86mm", "--range", "0.5,1.5", "-o", "a.pdf",
+        ],
+        &["a.rrd", "--range", "-1..3", "--disks", "-o", "e.svg"],
+        &["--fmax", "a.rrd", "--width", "12cm", "-o", "d.pdf"],
         &["b.mcap", "--step", "20", "--disks", "-o", "b.png"],
         &[
             "a.rrd",
@@ -95,9 +100,29 @@ fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
         text.contains("seed 2") && !text.contains("N = 64"),
         "only what differs"
     );
-    let refused: [(&[&str], &str); 5] = [
+    let text = std::fs::read_to_string(folder.path().join("e.svg")).expect("e.svg");
+    assert!(text.contains("undeformed disks"));
+    // 86 mm are 243.78 points of 1/72 inch.
+    let pdf = std::fs::read(folder.path().join("a.pdf")).expect("a.pdf");
+    let page = b"/MediaBox [0 0 243.78 ";
+    assert!(pdf.windows(page.len()).any(|bytes| bytes == page));
+    let refused: [(&[&str], &str); 11] = [
         (&["a.rrd", "-o", "a.svg"], "a.svg exists"),
-        (&["a.rrd", "-o", "x.gif"], ".svg or .png"),
+        (&["a.rrd", "-o", "x.gif"], ".svg, .pdf or .png"),
+        (&["a.rrd", "--range", "2..1", "-o", "x.svg"], "is empty"),
+        (&["a.rrd", "--range", "nan,1", "-o", "x.svg"], "0.5,1.5"),
+        (
+            &[
+                "a.rrd", "--range", "0..1", "--color", "nothing", "-o", "x.svg",
+            ],
+            "--range is for colours",
+        ),
+        (&["a.rrd", "--width", "3 apples", "-o", "x.svg"], "86mm"),
+        (&["a.rrd", "--width", "1e9", "-o", "x.svg"], "is outside"),
+        (
+            &["--fmax", "a.rrd", "--range", "0..1", "-o", "x.svg"],
+            "--range",
+        ),
         (
             &["a.rrd", "--step", "13", "-o", "x.svg"],
             "the nearest before it is 10",
