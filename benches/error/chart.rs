@@ -12,7 +12,10 @@ pub const SKY: &str = "#56B4E9";
 pub const BLACK: &str = "#222222";
 
 const INK: &str = "#222222";
-const GRID: &str = "#e4e4e4";
+/// Length of the marks on the frame, which point inwards.
+const TICK: f64 = 6.0;
+/// Distance of lines in a legend.
+const PITCH: f64 = 18.0;
 /// The plot area within a panel: left, top, width, height.
 const AREA: (f64, f64, f64, f64) = (74.0, 46.0, 330.0, 285.0);
 /// What a panel takes.
@@ -82,29 +85,22 @@ impl Axis {
         }
         let (first, last) = (a.log10().floor() as i32, b.log10().ceil() as i32);
         let every = ((last - first) / 6 + 1).max(1);
-        // Where there are few decades, 2 and 5 help.
-        let within: &[f64] = if b / a < 150.0 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
+        // Where there are few decades, 2 and 5 help, and plain numbers; an axis has one way of writing them.
+        let plain = b / a < 150.0;
+        let within: &[f64] = if plain { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let written = |k: i32, m: f64| {
+            if plain {
+                format!("{:.*}", (-k).max(0) as usize, m * 10f64.powi(k))
+            } else {
+                format!("10^{k}").replace('-', "−")
+            }
         };
         (first..=last)
             .filter(|k| (k - first) % every == 0)
             .flat_map(|k| within.iter().map(move |m| (k, *m)))
-            .map(|(k, m)| (m * 10f64.powi(k), power(k, m)))
+            .map(|(k, m)| (m * 10f64.powi(k), written(k, m)))
             .filter(|t| (-1e-9..=1.0 + 1e-9).contains(&self.place(t.0)))
             .collect()
-    }
-}
-
-/// `m · 10^k` as it is written on an axis: plain, or a power of ten whose exponent follows a `^`.
-fn power(k: i32, m: f64) -> String {
-    if (-2..=2).contains(&k) {
-        format!("{:.*}", (-k).max(0) as usize, m * 10f64.powi(k))
-    } else if m == 1.0 {
-        format!("10^{k}").replace('-', "−")
-    } else {
-        format!("{m} · 10^{k}").replace('-', "−")
     }
 }
 
@@ -138,7 +134,7 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Where the legend begins, between 0 and 1 from the left and from the top of the plot area.
     pub legend: (f64, f64),
-    /// Texts that end at values of x and y.
+    /// Texts that begin right below values of x and y.
     pub notes: Vec<(f64, f64, String)>,
 }
 
@@ -154,12 +150,14 @@ impl Panel {
         };
         for (value, label) in self.x.ticks() {
             let x = at(value, self.y.range.0).0;
-            line(&mut s, (x, top), (x, top + height), GRID);
-            tick(&mut s, (x, top + height + 19.0), "middle", &label);
+            line(&mut s, (x, top), (x, top + TICK), INK);
+            line(&mut s, (x, top + height), (x, top + height - TICK), INK);
+            tick(&mut s, (x, top + height + 20.0), "middle", &label);
         }
         for (value, label) in self.y.ticks() {
             let y = at(self.x.range.0, value).1;
-            line(&mut s, (left, y), (left + width, y), GRID);
+            line(&mut s, (left, y), (left + TICK, y), INK);
+            line(&mut s, (left + width, y), (left + width - TICK, y), INK);
             tick(&mut s, (left - 8.0, y + 5.0), "end", &label);
         }
         frame(&mut s, &self.x.label, Some(&self.y.label));
@@ -182,14 +180,14 @@ impl Panel {
         }
         for (x, y, note) in &self.notes {
             let (x, y) = at(*x, *y);
-            text(&mut s, (x - 9.0, y + 1.0), "end", note);
+            text(&mut s, (x + 9.0, y + 13.0), "start", note);
         }
         let (x, mut y) = (left + width * self.legend.0, top + height * self.legend.1);
         for series in self.series.iter().filter(|s| !s.label.is_empty()) {
             stroke(&mut s, &[(x, y), (x + 26.0, y)], series);
             mark(&mut s, (x + 13.0, y), series);
             text(&mut s, (x + 33.0, y + 5.0), "start", &series.label);
-            y += 19.0;
+            y += PITCH;
         }
         s
     }
@@ -212,15 +210,20 @@ impl Bars {
         let mut s = title(&self.title);
         let x = |value: f64| left + width * value / self.most;
         let pitch = height / self.rows.len().max(1) as f64;
-        let (mut at, every) = (0.0, if self.most > 4.0 { 2.0 } else { 0.5 });
+        let (mut at, every) = (0.0, if self.most > 2.0 { 1.0 } else { 0.5 });
         while at <= self.most {
             text(
                 &mut s,
                 (x(at), top + height + 19.0),
                 "middle",
-                &format!("{at:.1}"),
+                &format!("{at}"),
             );
-            line(&mut s, (x(at), top), (x(at), top + height), GRID);
+            line(
+                &mut s,
+                (x(at), top + height),
+                (x(at), top + height - TICK),
+                INK,
+            );
             at += every;
         }
         for (k, (name, value, remark)) in self.rows.iter().enumerate() {
@@ -234,7 +237,7 @@ impl Bars {
             let middle = y + 0.34 * pitch + 5.0;
             text(&mut s, (left - 6.0, middle), "end", name);
             // Behind a short bar, in a long one.
-            let behind = if *value < 0.55 * self.most {
+            let behind = if *value < 0.4 * self.most {
                 x(*value)
             } else {
                 left
@@ -257,7 +260,7 @@ impl Bars {
 
 fn title(title: &str) -> String {
     format!(
-        "<text x=\"10\" y=\"24\" font-size=\"17\" font-weight=\"bold\" fill=\"{INK}\">{title}</text>\n"
+        "<text x=\"10\" y=\"24\" font-size=\"16\" font-weight=\"bold\" fill=\"{INK}\">{title}</text>\n"
     )
 }
 
