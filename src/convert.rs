@@ -32,6 +32,7 @@ use crate::record::{
 use crate::relax::{RelaxError, Relaxation, Status};
 use crate::replay::{Event, ReadError, Recording};
 use crate::scene::{Channels, SceneError, Schedule};
+use crate::text::counted;
 use crate::text::shown;
 use std::collections::BTreeMap;
 
@@ -113,7 +114,7 @@ pub fn header(recording: &Recording, channels: Channels) -> Result<Header, Conve
     header.scene.validate()?;
     if channels.contours.is_on() || channels.contacts.is_on() {
         let particles = recording.radii().len();
-        let name = format_args!("drawing {particles} particles");
+        let name = format!("drawing {}", counted(particles, "particle"));
         recording.allow(name, header.scene.memory_estimate(particles))?;
     }
     Ok(header)

@@ -2,6 +2,7 @@
 
 use crate::domain::{Domain, Vec2};
 use crate::relax::fire::FireState;
+use crate::text::counted;
 
 /// The state *before* move `step`: positions and velocities, the contact forces solved at these positions, and the
 /// minimiser's own state. Together with the scene it determines the next frame to the last bit.
@@ -49,9 +50,9 @@ pub struct Frame {
 #[non_exhaustive]
 pub enum FrameError {
     /// Not one entry a particle.
-    #[error("{found} {what} for {particles} particles")]
+    #[error("{} for {}", counted(.found, .what), counted(.particles, "particle"))]
     Particles {
-        /// What is counted.
+        /// What is counted, in the singular.
         what: &'static str,
         /// How many there are.
         found: usize,
@@ -59,7 +60,7 @@ pub enum FrameError {
         particles: usize,
     },
     /// Not one force a contact.
-    #[error("{forces} forces for {contacts} contacts")]
+    #[error("{} for {}", counted(.forces, "force"), counted(.contacts, "contact"))]
     Forces {
         /// Number of forces.
         forces: usize,
@@ -80,7 +81,7 @@ pub enum FrameError {
     },
     /// More contacts of a particle than any packing has room for.
     #[error(
-        "particle {particle} has {contacts} contacts, where a packing has room for some dozens"
+        "particle {particle} has {}, where a packing has room for some dozens", counted(.contacts, "contact")
     )]
     Crowded {
         /// The particle.
@@ -157,8 +158,8 @@ impl Frame {
     /// ```
     pub fn validate(&self, particles: usize, domain: Domain) -> Result<(), FrameError> {
         for (what, found) in [
-            ("positions", self.positions.len()),
-            ("velocities", self.velocities.len()),
+            ("position", self.positions.len()),
+            ("velocity vector", self.velocities.len()),
         ] {
             if found != particles {
                 return Err(FrameError::Particles {

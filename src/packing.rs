@@ -1,12 +1,13 @@
 //! A packing: the box, the undeformed radii and the centres.
 
 use crate::domain::{Domain, Vec2};
+use crate::text::counted;
 use core::f64::consts::PI;
 use std::sync::Arc;
 
 /// `N` particles of fixed undeformed radii in a periodic box.
 ///
-/// Lengths are in units of the small particles' diameter when the default mixture is used; nothing depends on it.
+/// Lengths are in the unit of the radii, whichever that is: with the default mixture the diameter of the small particle.
 ///
 /// # Example
 ///
@@ -64,7 +65,7 @@ pub enum PackingError {
         y: f64,
     },
     /// Radii and positions do not have the same number.
-    #[error("{radii} radii for {positions} positions: a packing needs one radius a particle")]
+    #[error("radii: {radii}, positions: {positions}; a packing needs one radius a particle")]
     Count {
         /// Number of radii.
         radii: usize,
@@ -72,7 +73,7 @@ pub enum PackingError {
         positions: usize,
     },
     /// A packing has at least one and at most `u32::MAX` particles.
-    #[error("{0} particles: a packing has between 1 and 4294967295")]
+    #[error("{}: a packing has between 1 and 4294967295", counted(.0, "particle"))]
     Number(usize),
 }
 

@@ -10,7 +10,7 @@ use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
 use softjam::replay::{ReadError, Recording};
 use softjam::scene::Channels;
-use softjam::text::shown;
+use softjam::text::{counted, shown};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -87,16 +87,16 @@ pub(super) fn write(
     lines.line(
         "file",
         format!(
-            "{path} ({}, {} states)",
+            "{path} ({}, {})",
             HumanBytes(converted.written.bytes),
-            converted.written.states
+            counted(converted.written.states, "state")
         ),
     );
     if converted.rebuilt > 0 {
-        let steps = converted.rebuilt;
+        let steps = counted(converted.rebuilt, "step");
         lines.line(
             "rebuilt",
-            format!("{steps} steps computed again, in agreement with the recorded states"),
+            format!("{steps} computed again, in agreement with the recorded states"),
         );
     }
     lines.line("open it with", open_with(&output.path, output.format));

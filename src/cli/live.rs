@@ -2,6 +2,7 @@
 
 use super::{report, warn};
 use softjam::record::{Ended, Header, Live, Outcome, Viewer};
+use softjam::text::counted;
 
 /// A viewer to look on through.
 #[derive(clap::Args)]
@@ -76,7 +77,7 @@ impl View {
             return Ok(());
         };
         let shown = live.finish(outcome);
-        let of = format!("{} of {} recorded steps", shown.sent, shown.of);
+        let of = format!("{} of {}", shown.sent, counted(shown.of, "recorded step"));
         match shown.ended {
             Ended::Complete => report(&format!("{:<14} {of} shown at {place}\n", "live view"))?,
             Ended::Absent => warn(&format!("no live view: no viewer came up at {place}")),

@@ -17,7 +17,7 @@ use softjam::record::{self, Format, Header, Leg, RecordError, Summary, Writer};
 use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Event, Recording};
 use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
-use softjam::text::shown;
+use softjam::text::{counted, length, shown};
 use softjam::threads;
 use std::io::{BufRead as _, BufReader, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -487,7 +487,7 @@ fn report(
     run: &Relaxation,
     summary: &Summary,
     from: u64,
-    (disks_took, took): (Duration, Duration),
+    (start_took, took): (Duration, Duration),
 ) -> String {
     let o: Observables = run.observables();
     let packing = run.packing();
@@ -508,11 +508,11 @@ fn report(
     lines.line(
         "packing",
         format!(
-            "N = {}, φ = {:.4}, box {:.3} × {:.3}, {origin}",
+            "N = {}, φ = {:.4}, box {} × {}, {origin}",
             packing.len(),
             packing.coverage(),
-            l.x,
-            l.y
+            length(l.x),
+            length(l.y)
         ),
     );
     if let Some(disks) = run.disks() {
@@ -520,8 +520,10 @@ fn report(
         lines.line(
             "disks",
             format!(
-                "{} steps to f_max = {:.2e} γ, Z = {:.3}{ending}",
-                disks.steps, disks.f_max, disks.coordination
+                "{} to f_max = {:.2e} γ, Z = {:.3}{ending}",
+                counted(disks.steps, "step"),
+                disks.f_max,
+                disks.coordination
             ),
         );
     }
@@ -532,10 +534,10 @@ fn report(
     lines.line(
         "Z",
         format!(
-            "{:.4} ({} contacts between particles that are held, {} rattlers)",
+            "{:.4} ({} between particles that are held, {})",
             o.coordination(),
-            o.backbone_contacts,
-            o.rattlers
+            counted(o.backbone_contacts, "contact"),
+            counted(o.rattlers, "rattler")
         ),
     );
     lines.line("pressure", format!("{:.6e} γ/length", o.pressure()));
@@ -548,11 +550,13 @@ fn report(
         ),
     );
     let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);
+    // Without disks it is the time of the first contact problem.
+    let before = run.disks().map_or("start", |_| "disks");
     lines.line(
         "time",
         format!(
-            "{:.2} s disks, {:.2} s relaxation ({rate:.0} steps/s)",
-            disks_took.as_secs_f64(),
+            "{:.2} s {before}, {:.2} s relaxation ({rate:.0} steps/s)",
+            start_took.as_secs_f64(),
             took.as_secs_f64()
         ),
     );
@@ -560,10 +564,10 @@ fn report(
         lines.line(
             "file",
             format!(
-                "{} ({}, {} states)",
+                "{} ({}, {})",
                 output.path.display(),
                 HumanBytes(written.bytes),
-                written.states
+                counted(written.states, "state")
             ),
         );
         lines.line("open it with", open_with(&output.path, output.format));

@@ -1,6 +1,7 @@
 //! [`ContactError`].
 
 use super::solver::SolverError;
+use crate::text::counted;
 
 /// Why the contact problem has no answer.
 ///
@@ -51,7 +52,7 @@ pub enum ContactError {
     },
     /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
     #[error(
-        "the contact set did not settle: {offending} of {contacts} pairs still offend after {sweeps} sweeps"
+        "the contact set did not settle: {offending} of {} still offending after {}", counted(.contacts, "pair"), counted(.sweeps, "sweep")
     )]
     Unsettled {
         /// Pairs that still break the law.

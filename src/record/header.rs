@@ -5,7 +5,7 @@ use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, legend, legs_to_text};
 use crate::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
-use crate::text::shown;
+use crate::text::{length, shown};
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
@@ -140,12 +140,12 @@ fn text(header: &Header) -> String {
     };
     let mut parts = vec![format!(
         "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
-         {:.3} × {:.3}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
+         {} × {}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
          {}.\n\n",
         packing.len(),
         packing.coverage(),
-        l.x,
-        l.y,
+        length(l.x),
+        length(l.y),
         scene.line_tension,
         scene.threshold,
         header.program,

@@ -305,7 +305,7 @@ impl Balance {
         }
     }
 
-    /// Whether all frames seen fulfil the contact law to the tolerance that is due in them. With the seed's rule contacts lag behind their
+    /// Whether all frames seen fulfil the contact law to the tolerance that is due in them. With Saitoh's rule contacts lag behind their
     /// positions by a step, so only the last frame is asked for: its step must not be among the worst.
     ///
     /// See the example of [`Balance`].
@@ -313,7 +313,7 @@ impl Balance {
     pub fn agrees(&self) -> bool {
         let last = self.last.map_or(0, |(step, _)| step);
         let within =
-            |worst: &Worst| worst.agrees() || (self.rule == Rule::Seed && worst.step != last);
+            |worst: &Worst| worst.agrees() || (self.rule == Rule::Saitoh && worst.step != last);
         self.failed.is_none()
             && within(&self.equation_4)
             && within(&self.overlap)

@@ -4,6 +4,7 @@ use crate::domain::Vec2;
 use crate::frame::Frame;
 use crate::relax::Stability;
 use crate::relax::fire::FireState;
+use crate::text::counted;
 use core::fmt;
 
 /// The first difference between a recorded frame and the one it is held against.
@@ -46,7 +47,7 @@ pub enum What {
     },
     /// The number of a list's entries.
     Count {
-        /// What is counted.
+        /// What is counted, in the plural.
         name: &'static str,
         /// What was recorded.
         here: usize,
@@ -203,14 +204,16 @@ impl fmt::Display for Difference {
         match &self.what {
             What::Value { name, here, there } => {
                 let distance = ulps(*here, *there);
-                let unit = if distance == 1 { "ulp" } else { "ulps" };
-                write!(
-                    f,
-                    "{name}: {here:?} here, {there:?} there ({distance} {unit})"
-                )
+                let apart = counted(distance, "ulp");
+                // Of a number of things a person expects a whole number.
+                let counts = ["metric contacts", "metric rattlers"].contains(&&**name);
+                if counts && here.fract() == 0.0 && there.fract() == 0.0 {
+                    return write!(f, "{name}: {here} here, {there} there");
+                }
+                write!(f, "{name}: {here:?} here, {there:?} there ({apart})")
             }
             What::Count { name, here, there } => {
-                write!(f, "{here} {name} here, {there} there")
+                write!(f, "{name}: {here} here, {there} there")
             }
             What::Contact {
                 contact,
@@ -245,7 +248,7 @@ impl fmt::Display for Difference {
                     "the run {word} converged here, and the result says otherwise"
                 )
             }
-            What::Steps { here } => write!(f, "the result names {here} steps"),
+            What::Steps { here } => write!(f, "the result names {}", counted(here, "step")),
         }
     }
 }

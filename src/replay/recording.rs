@@ -17,6 +17,7 @@ use crate::frame::{Frame, FrameError};
 use crate::packing::{Packing, coverage};
 use crate::record::{Format, Leg, Outcome};
 use crate::scene::{Minimizer, Scene};
+use crate::text::counted;
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -188,7 +189,7 @@ impl Recording {
             return Err(unknown(match start.len() {
                 0 => "the file is empty".to_owned(),
                 8 => "it begins like neither".to_owned(),
-                n => format!("it has only {n} bytes"),
+                n => format!("it has only {}", counted(n, "byte")),
             }));
         };
         let whole = Box::new(Cursor::new(start).chain(source));
@@ -579,7 +580,10 @@ impl Recording {
             ));
         }
         if self.steps.last.is_some_and(|last| last != outcome.steps) {
-            return Err(wrong(format!("it names {} steps", outcome.steps)));
+            return Err(wrong(format!(
+                "it names {}",
+                counted(outcome.steps, "step")
+            )));
         }
         if self.outcome.is_some() {
             return Err(wrong("it is there twice".to_owned()));

@@ -7,6 +7,7 @@ use crate::frame::Frame;
 use crate::packing::coverage;
 use crate::record::{FORMAT_VERSION, Leg, Outcome};
 use crate::scene::{Scene, SceneFields};
+use crate::text::counted;
 use crate::text::shown;
 use std::cell::Cell;
 use std::panic::AssertUnwindSafe;
@@ -110,7 +111,10 @@ impl Header {
         let (claimed, held) = (self.scene.particles, self.radii.len());
         let phi = coverage(&self.radii, self.domain);
         let problem = if self.scene.starts_from_disks() && claimed != held {
-            format!("the scene has {claimed} particles, the file holds radii of {held}")
+            {
+                let claimed = counted(claimed, "particle");
+                format!("the scene has {claimed}, the file holds radii of {held}")
+            }
         } else if phi > 0.0 && phi < 1.3 + 1e-9 {
             return Ok(());
         } else {
@@ -119,6 +123,13 @@ impl Header {
         let path = path.to_owned();
         Err(ReadError::Particles { path, problem })
     }
+}
+
+/// What is said of bytes behind the end of a recording.
+pub(super) fn more_behind(bytes: u64) -> String {
+    let follow = if bytes == 1 { "follows" } else { "follow" };
+    let bytes = counted(bytes, "byte");
+    format!("{bytes} {follow} the end of the recording: several files in one?")
 }
 
 /// Refuses a layout that was made after this program.

@@ -166,7 +166,7 @@ fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
                 frame.minimizer.alpha *= 0.99;
             }
         }),
-        ("contacts here", |s| {
+        ("contacts: ", |s| {
             if let Some(frame) = s.frame.as_mut().filter(|f| f.step == 40) {
                 frame.contacts.pop();
                 frame.forces.pop();
@@ -254,7 +254,7 @@ fn both_contact_rules_and_a_lattice_verify() {
     let base = scene();
     let scenes = [
         Scene {
-            contact_rule: softjam::contact::Rule::Seed,
+            contact_rule: softjam::contact::Rule::Saitoh,
             ..base.clone()
         },
         Scene {

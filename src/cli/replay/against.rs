@@ -4,6 +4,7 @@ use super::Arguments;
 use crate::cli::lines::Lines;
 use crate::cli::{Verdict, print};
 use softjam::replay::{Comparison, Recording, compare, place_of_byte};
+use softjam::text::counted;
 use softjam::text::shown;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -38,8 +39,9 @@ pub(super) fn against(here: &Path, there: &Path, arguments: &Arguments) -> anyho
         None => "the same to the last bit".to_owned(),
     };
     let rows = format!(
-        "states at {} common steps and {} metrics",
-        found.common, found.metrics
+        "states at {} and {}",
+        counted(found.common, "common step"),
+        counted(found.metrics, "metric")
     );
     let checked = if alike {
         format!(

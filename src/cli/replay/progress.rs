@@ -3,6 +3,7 @@
 use crate::cli::{talks, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use softjam::replay::Recording;
+use softjam::text::counted;
 use std::io::IsTerminal as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,7 +41,8 @@ impl Progress {
             let mut wait = LONG;
             while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(wait) {
                 let text = format!(
-                    "running {particles} particles again, towards the recorded step {} (the scene's limit is {limit}); {} s so far, Ctrl-C ends it",
+                    "running {} again, towards the recorded step {} (the scene's limit is {limit}); {} s so far, Ctrl-C ends it",
+                    counted(particles, "particle"),
                     seen.load(Ordering::Relaxed),
                     start.elapsed().as_secs()
                 );

@@ -9,7 +9,7 @@ use softjam::replay::{
     Balance, Bytes, Determinism, Origin, Recording, ReplayError, Standing, State, Way, Worst,
     determinism, place_of_byte,
 };
-use softjam::text::shown;
+use softjam::text::{counted, shown};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -191,7 +191,7 @@ impl Findings {
                 .push("the contact law and the balance of forces (--only determinism)".to_owned()),
             Some(b) => checked.push(format!(
                 "contacts, forces and balance, found anew from the positions of {}",
-                count(b.frames, "state")
+                counted(b.frames, "state")
             )),
         }
         let not = if not.is_empty() {
@@ -215,7 +215,7 @@ impl Findings {
     }
 
     fn tell_determinism(&self, d: &Determinism, checked: &mut Vec<String>, not: &mut Vec<String>) {
-        let steps = count(d.run, "step");
+        let steps = counted(d.run, "step");
         let begin = match d.origin {
             Origin::Scene => "the scene run again from its start",
             Origin::Positions => "the scene run again from the first recorded positions",
@@ -236,8 +236,8 @@ impl Findings {
         }
         let rows = format!(
             "{} and {}",
-            count(d.states, "state"),
-            count(d.metrics, "metric")
+            counted(d.states, "state"),
+            counted(d.metrics, "metric")
         );
         checked.push(match d.deviation {
             None => {
@@ -318,7 +318,7 @@ impl Findings {
             } else {
                 "not converged"
             };
-            let (steps, f_max) = (count(end.steps, "step"), end.f_max);
+            let (steps, f_max) = (counted(end.steps, "step"), end.f_max);
             lines.line("result", format!("{word}, {steps}, f_max = {f_max:.3e} γ"));
         }
         if let Some(lacks) = self.lacks() {
@@ -388,12 +388,6 @@ fn nothing_was_run(d: &Determinism) -> bool {
     d.origin == Origin::Frame && d.run == 0
 }
 
-/// A number of things, in words.
-fn count(n: u64, thing: &str) -> String {
-    let s = if n == 1 { "" } else { "s" };
-    format!("{n} {thing}{s}")
-}
-
 fn tell_difference(d: &Determinism) -> String {
     let (first, last) = d.steps.unwrap_or_default();
     if let Some(difference) = &d.difference {
@@ -404,8 +398,8 @@ fn tell_difference(d: &Determinism) -> String {
     }
     let what = format!(
         "{} and {}, steps {first} … {last}",
-        count(d.states, "state"),
-        count(d.metrics, "metric")
+        counted(d.states, "state"),
+        counted(d.metrics, "metric")
     );
     match d.deviation {
         None => format!("{what}: the same to the last bit"),
@@ -479,7 +473,7 @@ fn tell_balance(b: &Balance, lines: &mut Lines) {
         let (n, step) = (b.contacts.value, b.contacts.step);
         lines.line(
             "contacts",
-            format!("{n} pairs on one side only (step {step})"),
+            format!("{} on one side only (step {step})", counted(n, "pair")),
         );
     }
     if let Some((step, error)) = &b.failed {

@@ -15,6 +15,7 @@ pub(crate) use conjugate_gradient::Progress;
 pub use gauss_jordan::GaussJordan;
 
 use super::matrix::ContactMatrix;
+use crate::text::counted;
 
 /// Which solver to use.
 ///
@@ -74,7 +75,7 @@ pub enum SolverError {
     },
     /// The residual did not fall to the tolerance.
     #[error(
-        "the contact forces did not converge: residual {residual:e} after {iterations} iterations, asked for {tolerance:e}"
+        "the contact forces did not converge: residual {residual:e} after {}, asked for {tolerance:e}", counted(.iterations, "iteration")
     )]
     NotConverged {
         /// The largest residual `|A f − δ|` reached (length).

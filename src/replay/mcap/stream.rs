@@ -4,8 +4,8 @@
 //! breaks off for a broken one. The records themselves are decoded by the library.
 
 use crate::budget::Budget;
-use crate::replay::source::{Ending, Problem, guarded};
-use crate::text::shown;
+use crate::replay::source::{Ending, Problem, guarded, more_behind};
+use crate::text::{counted, shown};
 use mcap::MAGIC;
 use mcap::records::{ChunkHeader, Record, op};
 use rerun::external::re_log_encoding::external::lz4_flex;
@@ -150,11 +150,8 @@ impl Stream {
                 return Err("it does not end like an MCAP file".to_owned().into());
             }
             if self.offset < self.length {
-                return Err(format!(
-                    "{} bytes follow the end of the recording: several files in one?",
-                    self.length - self.offset
-                )
-                .into());
+                let more = self.length - self.offset;
+                return Err(more_behind(more).into());
             }
             self.ending = Some(Ending::Closed);
             return Ok(None);
@@ -215,7 +212,8 @@ fn unpack(header: &ChunkHeader, packed: &[u8]) -> Result<Vec<u8>, String> {
     .map_err(wrong)?;
     if bytes.len() as u64 != claimed {
         return Err(format!(
-            "a chunk claims to hold {claimed} bytes and does not"
+            "a chunk claims to hold {} and does not",
+            counted(claimed, "byte")
         ));
     }
     let saved = header.uncompressed_crc;

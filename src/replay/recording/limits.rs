@@ -6,6 +6,7 @@ use crate::crowding::{self, Crowd};
 use crate::domain::Vec2;
 use crate::frame::Frame;
 use crate::packing::Packing;
+use crate::text::counted;
 
 /// Bytes that the metrics of a step take while they wait for a state.
 const WAITING_METRICS: u64 = 800;
@@ -70,14 +71,15 @@ impl Recording {
     pub fn check_run(&self, frame: &Frame) -> Result<(), ReadError> {
         let (_, overlaps) = self.packing_and_overlaps(frame)?;
         let (scene, particles) = (self.scene(), self.header.radii.len());
-        let name = format_args!("a run of its scene with {particles} particles");
+        let name = format!("a run of its scene with {}", counted(particles, "particle"));
         self.allow(name, scene.memory_estimate(particles))?;
         let unknowns = overlaps.max(frame.contacts.len());
         if scene.contact_solver != Method::GaussJordan {
             return Ok(());
         }
-        let name = format_args!("its contact_solver \"gauss-jordan\" with {unknowns} unknowns");
-        self.allow(name, (unknowns as u64).saturating_pow(2).saturating_mul(8))?;
+        let unknown = counted(unknowns, "unknown");
+        let name = format!("its contact_solver \"gauss-jordan\" with {unknown}");
+        self.allow(&name, (unknowns as u64).saturating_pow(2).saturating_mul(8))?;
         if unknowns <= LARGEST_DENSE {
             return Ok(());
         }
@@ -101,7 +103,10 @@ impl Recording {
 
     pub(super) fn allow_waiting_metrics(&self) -> Result<(), ReadError> {
         let steps = self.metrics.len() as u64;
-        let name = format_args!("the metrics of {steps} steps between two states");
+        let name = format!(
+            "the metrics of {} between two states",
+            counted(steps, "step")
+        );
         let allowed = self.budget.allow_piece(name, WAITING_METRICS * steps);
         allowed.map_err(|exceeded| ReadError::Budget {
             path: self.path.clone(),

@@ -5,7 +5,8 @@
 //! decoded by rerun.
 
 use crate::budget::Budget;
-use crate::replay::source::{Ending, Problem, guarded};
+use crate::replay::source::{Ending, Problem, guarded, more_behind};
+use crate::text::counted;
 use re_protos::common::v1alpha1::Compression;
 use re_protos::log_msg::v1alpha1::ArrowMsg;
 use re_protos::log_msg::v1alpha1::log_msg::Msg;
@@ -54,7 +55,7 @@ impl Stream {
             return Err("the file is empty".to_owned());
         }
         source.read_exact(&mut header).map_err(|e| match e.kind() {
-            io::ErrorKind::UnexpectedEof => format!("it has only {length} bytes"),
+            io::ErrorKind::UnexpectedEof => format!("it has only {}", counted(length, "byte")),
             _ => e.to_string(),
         })?;
         let StreamHeader { options, .. } =
@@ -163,10 +164,7 @@ impl Stream {
         self.read(footer)?;
         StreamFooter::from_rrd_bytes(&self.bytes).map_err(|e| format!("its footer: {e}"))?;
         if left > footer {
-            return Err(format!(
-                "{} bytes follow the end of the recording: several files in one?",
-                left - footer
-            ));
+            return Err(more_behind(left - footer));
         }
         self.ending = Some(Ending::Closed);
         Ok(None)
