@@ -1,4 +1,4 @@
-//! The seed's figure 5: a packing of undeformed disks (a), and the deformable particles that relax from it (b).
+//! Saitoh's figure 5: a packing of undeformed disks (a), and the deformable particles that relax from it (b).
 //!
 //! `cargo run --release --example figure5 -- [FOLDER]` writes `figure5a.svg` and `figure5b.svg`. The disks of (a) overlap where
 //! they touch; the particles of (b) give way to each other.

@@ -1,4 +1,4 @@
-//! The seed's figure 6: how `f_max` falls with the number of steps, for several coverages and samples.
+//! Saitoh's figure 6: how `f_max` falls with the number of steps, for several coverages and samples.
 //!
 //! `cargo run --release --example figure6 -- [FOLDER [N]]` writes `figure6.svg`, and the numbers as `figure6.csv`: one line a
 //! step. Near jamming, φ = 0.84, some samples take long, others come apart at once.

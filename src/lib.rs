@@ -27,8 +27,8 @@
 //!
 //! # Units
 //!
-//! Lengths in diameters of the small particle (with the default mixture), forces in units of `γ`, mass 1. The coverage
-//! `φ` is always that of the undeformed disks.
+//! Lengths in the unit of the radii (with the default mixture the diameter of the small particle), forces in units of `γ`, mass
+//! 1. The coverage `φ` is always that of the undeformed disks.
 //!
 //! # The modules
 //!

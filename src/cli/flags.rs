@@ -63,7 +63,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "DT", value_parser = real, allow_negative_numbers = true, help_heading = RELAXATION)]
     dt_max: Option<f64>,
 
-    /// How the contact list follows the positions: complementarity (solved for in every step) or seed (one drop-and-add a
+    /// How the contact list follows the positions: complementarity (solved for in every step) or saitoh (one drop-and-add a
     /// step, as in the paper) [default: complementarity].
     #[arg(long, value_name = "RULE", value_parser = named::<softjam::contact::Rule>, help_heading = RELAXATION)]
     contact_rule: Option<softjam::contact::Rule>,
@@ -95,7 +95,7 @@ pub struct ChannelFlags {
     every: Option<i64>,
 
     /// Draw contours and contacts anew when a particle has moved by more than this (mean radii), or a pressure or force has
-    /// changed by more than five times this (means); 0 draws them whenever they are scheduled [default: as in the scene or the
+    /// changed by more than ten times this (means); 0 draws them whenever they are scheduled [default: as in the scene or the
     /// recording; 0.01 in the default scene].
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = real, help_heading = RECORDING)]
     redraw: Option<f64>,

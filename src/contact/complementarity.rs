@@ -1,4 +1,4 @@
-//! The linear complementarity problem of the contact law, and the seed's drop-and-add rule.
+//! The linear complementarity problem of the contact law, and Saitoh's drop-and-add rule.
 //!
 //! # The way to the answer
 //!

@@ -30,7 +30,10 @@ pub enum Rule {
     /// Saitoh 2.2.5: in every step solve, drop the contacts with `f < 0`, add the pairs with `Δ > 0`, solve once more. The
     /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
     /// exceed the solver's tolerance.)
-    Seed,
+    ///
+    /// Until version 0.2 it was called `seed`, which scenes may still say.
+    #[serde(alias = "seed")]
+    Saitoh,
 }
 
 /// The contact law: a solver of the contact problem with its settings, its buffers and its last answer.
@@ -375,7 +378,7 @@ impl ContactLaw {
         self.work.solves += 1;
         match self.rule {
             Rule::Complementarity => self.settle(packing)?,
-            Rule::Seed => {
+            Rule::Saitoh => {
                 (self.slack, self.precision) = (0.0, Precision::Double);
                 self.sweep(packing)?;
                 self.exchange(packing, self.offending.len());
@@ -387,7 +390,7 @@ impl ContactLaw {
 
     /// Solves on at the positions solved last, to the tolerance that is due at `f_max` (units of γ).
     pub(crate) fn tighten(&mut self, packing: &Packing, f_max: f64) -> Result<(), ContactError> {
-        if self.rule == Rule::Seed {
+        if self.rule == Rule::Saitoh {
             // It solves twice and takes what comes.
             return Ok(());
         }
@@ -421,7 +424,7 @@ impl ContactLaw {
             Rule::Complementarity => {
                 relative_tolerance(self.tolerance, slack(packing, f_max), self.scale())
             }
-            Rule::Seed => self.tolerance,
+            Rule::Saitoh => self.tolerance,
         }
     }
 

@@ -15,7 +15,7 @@
 //!
 //! that is, for the minimum of `½ fᵀA f − δᵀf` over `f ≥ 0`. `A` is positive definite, so there is exactly one answer:
 //! the contact list is a function of the positions alone. [`complementarity`] finds it by exchanging contacts between
-//! the two sides; the seed's drop-and-add rule is one such exchange and can be had on its own.
+//! the two sides; Saitoh's drop-and-add rule is one such exchange and can be had on its own.
 //!
 //! [`ContactLaw`] is what the rest of the crate sees: positions in, contacts and forces out. A second law would be
 //! added behind it.

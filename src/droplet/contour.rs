@@ -1,7 +1,7 @@
 //! Contours as polygons, Saitoh (1), (3) and 2.3.
 //!
 //! A vertex at angle θ lies at `r_i + ρ_i(θ)(cos θ, sin θ)` with `ρ_i(θ) = R_i + (R_i/2πγ) Σ_j f_ij g(θ − θ_j)`. The
-//! contour has a cusp at each contact. Vertices at equal angles, as in the seed, cut the cusps off; with
+//! contour has a cusp at each contact. Vertices at equal angles, as in Saitoh's figures, cut the cusps off; with
 //! [`Placement::Contacts`] one more vertex stands on each contact angle, so that the contour is drawn to its tip.
 //!
 //! Between two neighbouring contacts the contour is one elementary function: with `g(θ) = (π − θ) sin θ − ½ cos θ − 1` and
@@ -59,7 +59,7 @@ impl Default for ContourStyle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Placement {
-    /// Equally spaced angles, as in the seed.
+    /// Equally spaced angles, as in Saitoh's figures.
     Equal,
     /// Equally spaced angles and one vertex on each contact angle.
     #[default]

@@ -17,7 +17,7 @@ impl Scene {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut page = Page::default();
-        page.text("# softjam scene. Lengths in diameters of the small particle, forces in units of the line tension, mass 1.");
+        page.text("# softjam scene. Lengths in the unit of the radii (by default the diameter of the small particle), forces in that of the line\n# tension, mass 1.");
         self.write_packing(&mut page);
         self.write_relaxation(&mut page);
         self.write_recording(&mut page);
@@ -134,7 +134,7 @@ impl Scene {
             ),
         }
         page.field(
-            "Contact list: \"complementarity\" (f >= 0, gap >= 0, f gap = 0 in every step) or \"seed\" (one drop-and-add a step).",
+            "Contact list: \"complementarity\" (f >= 0, gap >= 0, f gap = 0 in every step) or \"saitoh\" (one drop-and-add a step).",
             "contact_rule",
             value(&self.contact_rule),
         );
@@ -170,7 +170,7 @@ impl Scene {
         for (name, schedule) in self.channels.named() {
             page.line(name, quoted(&schedule.to_string()));
         }
-        page.text("# Contours and contacts are drawn anew when a particle has moved by more than this (mean radii), or a pressure or\n# force has changed by more than five times this (means), since they were last drawn; 0 draws every time.");
+        page.text("# Contours and contacts are drawn anew when a particle has moved by more than this (mean radii), or a pressure or\n# force has changed by more than ten times this (means), since they were last drawn; 0 draws every time.");
         page.line("redraw", number(self.channels.redraw));
     }
 }

@@ -55,7 +55,7 @@ class Recording:
                 self.line_tension = scene["line_tension"]
                 self.gradient = scene.get("forces", "central") == "gradient"
                 self.threshold, self.tolerance = scene["threshold"], scene["contact_tolerance"]
-                self.seed_rule = scene["contact_rule"] == "seed"
+                self.seed_rule = scene["contact_rule"] in ("saitoh", "seed")
                 self.channels = scene["channels"]
             if entity in BESIDE and not chunk.is_static:
                 columns = [batch[name] for name in BESIDE[entity]]

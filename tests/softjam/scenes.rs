@@ -279,3 +279,12 @@ fn scene_without_a_step_limit_survives_the_way_through_its_text() {
     scene.validate().unwrap();
     assert_eq!(Scene::from_toml(&scene.to_toml()).unwrap(), scene);
 }
+
+#[test]
+fn the_name_that_saitohs_rule_had_until_version_0_2_is_read() {
+    for name in ["saitoh", "seed"] {
+        let scene = Scene::from_toml(&format!("contact_rule = \"{name}\"")).unwrap();
+        assert_eq!(scene.contact_rule, softjam::contact::Rule::Saitoh);
+        assert!(scene.to_toml().contains("contact_rule = \"saitoh\""));
+    }
+}

@@ -25,7 +25,7 @@ fn scenes() -> Vec<Scene> {
             ..scene(80, 0.92, 4)
         },
         Scene {
-            contact_rule: Rule::Seed,
+            contact_rule: Rule::Saitoh,
             contact_solver: Method::SparseCholesky,
             ..scene(80, 0.9, 5)
         },

@@ -183,7 +183,7 @@ fn answer_from_the_step_before_is_the_answer_from_nothing() {
 }
 
 #[test]
-fn seed_rule_repeated_at_fixed_positions_ends_at_the_contact_law() {
+fn saitoh_rule_repeated_at_fixed_positions_ends_at_the_contact_law() {
     let mut random = Random::new(78);
     let mut worst: f64 = 0.0;
     let mut most = 0;
@@ -192,7 +192,7 @@ fn seed_rule_repeated_at_fixed_positions_ends_at_the_contact_law() {
         let mut guesses = vec![(Vec::new(), Vec::new())];
         guesses.extend((0..12).map(|k| wrong_guess(&packing, k % 2, &mut random)));
         for (pairs, forces) in guesses {
-            let mut seed = law(Rule::Seed, Method::ConjugateGradient);
+            let mut seed = law(Rule::Saitoh, Method::ConjugateGradient);
             seed.solve(&packing, &pairs, &forces).unwrap();
             let mut repeats = 0;
             while seed.residual() > seed.accepted_residual() {
@@ -205,7 +205,7 @@ fn seed_rule_repeated_at_fixed_positions_ends_at_the_contact_law() {
         }
     }
     println!("at most {most} repeats");
-    assert_at_most("force by the seed's rule, difference", worst, 1e-10);
+    assert_at_most("force by Saitoh's rule, difference", worst, 1e-10);
 }
 
 /// The same contact problem on packings that are one and the same to physics: positions by `place`, particles by `name`.

@@ -17,7 +17,7 @@ const METHODS: [Method; 3] = [
 
 #[test]
 fn single_particle_is_in_balance_at_once() {
-    for rule in [Rule::Complementarity, Rule::Seed] {
+    for rule in [Rule::Complementarity, Rule::Saitoh] {
         let scene = Scene {
             contact_rule: rule,
             ..scene(1, 0.05, 1)
@@ -113,16 +113,16 @@ fn neighbours_in_one_direction_give_an_answer_or_an_error_but_no_panic() {
             })
             .collect();
         for method in METHODS {
-            for rule in [Rule::Complementarity, Rule::Seed] {
+            for rule in [Rule::Complementarity, Rule::Saitoh] {
                 let mut law = ContactLaw::new(rule, method, 1.0, 1e-12);
                 match law.solve(&packing(&points), &[], &[]) {
                     Ok(()) => {
                         answered += 1;
                         assert!(law.contacts().forces.iter().all(|f| f.is_finite()));
-                        // The seed's rule promises no more after two sweeps than numbers.
+                        // Saitoh's rule promises no more after two sweeps than numbers.
                         let most = match rule {
                             Rule::Complementarity => law.accepted_residual(),
-                            Rule::Seed => f64::MAX,
+                            Rule::Saitoh => f64::MAX,
                         };
                         assert!(law.residual() <= most, "case {case} {method:?} {rule:?}");
                     }
@@ -252,7 +252,7 @@ fn frame_with_impossible_forces_is_an_error_or_a_run_but_no_panic() {
         .flat_map(|i| (i + 1..40).map(move |j| [i, j]))
         .collect();
     for force in [1e300, -1e300, 1.0, -1.0, 0.0, -0.0] {
-        for rule in [Rule::Complementarity, Rule::Seed] {
+        for rule in [Rule::Complementarity, Rule::Saitoh] {
             let mut frame = start.frame();
             frame.contacts = all.clone();
             frame.forces = vec![force; all.len()];

@@ -167,7 +167,7 @@ fn run_taken_up_at_every_frame_makes_the_same_next_step() {
             ..finishing(64, 0.95, 3)
         },
         Scene {
-            contact_rule: Rule::Seed,
+            contact_rule: Rule::Saitoh,
             contact_solver: Method::SparseCholesky,
             ..finishing(48, 0.88, 4)
         },
@@ -323,7 +323,7 @@ fn all_solvers_rules_and_tensions_are_finished() {
         Method::SparseCholesky,
         Method::GaussJordan,
     ] {
-        for contact_rule in [Rule::Complementarity, Rule::Seed] {
+        for contact_rule in [Rule::Complementarity, Rule::Saitoh] {
             let (run, _) = run_to_the_end(&Scene {
                 contact_rule,
                 contact_solver,

@@ -14,13 +14,13 @@ use softjam::threads;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 #[test]
-fn seed_rule_and_contact_law_end_in_the_same_packing() {
+fn saitoh_rule_and_contact_law_end_in_the_same_packing() {
     let mut worst: f64 = 0.0;
     for particles in [64, 96, 128] {
         for seed in 1..=4 {
             let law = converged(&scene(particles, 0.9, seed));
             let rule = converged(&Scene {
-                contact_rule: Rule::Seed,
+                contact_rule: Rule::Saitoh,
                 ..scene(particles, 0.9, seed)
             });
             worst = worst.max(largest_difference(&answer(law.law()), &answer(rule.law())));
@@ -180,7 +180,7 @@ fn run_taken_up_at_any_frame_ends_in_the_same_bits() {
         },
     ];
     for scene in scenes {
-        for contact_rule in [Rule::Complementarity, Rule::Seed] {
+        for contact_rule in [Rule::Complementarity, Rule::Saitoh] {
             for contact_solver in [Method::ConjugateGradient, Method::SparseCholesky] {
                 let scene = Scene {
                     contact_rule,
