@@ -12,15 +12,22 @@ from plot import show
 
 
 def read(path):
-    """Metrics {name: {step: value}} and states {step: {name: array}} of a recording."""
-    metrics, states = {}, {}
+    """Metrics {name: {step: value}}, states {step: {name: array}} and what does not change: {"radius": the undeformed
+    radii, "box": its two sides, "scene": the scene as TOML}.
+
+    A recording without metrics or states gives empty dictionaries of them. Net forces and stress of a state: net_forces.py.
+    """
+    metrics, states, packing = {}, {}, {}
     with open(path, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
-        for _, channel, _, message in reader.iter_decoded_messages(topics=["/metrics", "/state"]):
+        for _, channel, _, message in reader.iter_decoded_messages(topics=["/metrics", "/state", "/particles"]):
             if channel.topic == "/metrics":
                 for field, value in message.ListFields():
                     if field.name not in ("step", "sim_time_ns"):
                         metrics.setdefault(field.name, {})[message.step] = value
+            elif channel.topic == "/particles":
+                packing["radius"] = np.array(message.radius)
+                packing["box"] = np.array(message.box)
             else:
                 states[message.step] = {
                     "position": np.array(message.position).reshape(-1, 2),
@@ -29,7 +36,10 @@ def read(path):
                     "force": np.array(message.force),
                     "minimizer": np.array(message.minimizer),
                 }
-    return metrics, states
+        for attachment in reader.iter_attachments():
+            if attachment.name == "scene.toml":
+                packing["scene"] = attachment.data.decode()
+    return metrics, states, packing
 
 
 if __name__ == "__main__":

@@ -8,11 +8,12 @@ use super::{Verdict, complain, print};
 use softjam::budget::Budget;
 use softjam::contact::FrameContacts;
 use softjam::droplet::validity::{SQUEEZE_LIMIT, Validity};
+use softjam::force::{FrameForces, Observables};
 use softjam::frame::Frame;
 use softjam::record::Outcome;
 use softjam::relax::Stability;
 use softjam::replay::{Event, ReadError, Recording, Standing};
-use softjam::text::shown;
+use softjam::text::{counted, length, shown};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use table::Row;
@@ -109,6 +110,15 @@ impl Findings {
             Some(_) => Standing::BrokenOff,
             None => recording.standing(),
         }
+    }
+
+    /// Stress of the last state; nothing if it is no state of this packing.
+    fn observables(&self, recording: &Recording) -> Option<Observables> {
+        let last = self.last.as_ref()?;
+        let packing = recording.packing(last).ok()?;
+        let scene = recording.scene();
+        let forces = FrameForces::of(&packing, last, scene.line_tension, scene.forces);
+        Some(*forces.observables())
     }
 
     /// How far the last state strains the linear model; nothing if it is no state of this packing.
@@ -216,11 +226,11 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
     lines.line(
         "packing",
         format!(
-            "N = {}, φ = {:.4}, box {:.3} × {:.3}, γ = {}",
+            "N = {}, φ = {:.4}, box {} × {}, γ = {}",
             recording.radii().len(),
             recording.coverage(),
-            l.x,
-            l.y,
+            length(l.x),
+            length(l.y),
             scene.line_tension
         ),
     );
@@ -249,7 +259,7 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
         };
         lines.line(
             channel,
-            format!("{count} steps, {first} … {last}{where_drawn}"),
+            format!("{}, {first} … {last}{where_drawn}", counted(count, "step")),
         );
     }
     if !found.channels.contains_key("state") {
@@ -270,13 +280,34 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
         lines.line(
             "squeeze",
             format!(
-                "mean {:.4}, largest {:.4} (particle {}); {} of {} particles beyond {SQUEEZE_LIMIT}",
-                squeeze.mean, squeeze.largest, squeeze.particle, squeeze.beyond, squeeze.particles
+                "mean {:.4}, largest {:.4} (particle {}); {} of {} beyond {SQUEEZE_LIMIT}",
+                squeeze.mean,
+                squeeze.largest,
+                squeeze.particle,
+                squeeze.beyond,
+                counted(squeeze.particles, "particle")
+            ),
+        );
+    }
+    if let Some(o) = found.observables(recording) {
+        lines.line(
+            "stress",
+            format!(
+                "σ_xx {:.6e}, σ_yy {:.6e}, σ_xy {:.6e} γ/length (tension positive)",
+                o.stress_xx(),
+                o.stress_yy(),
+                o.stress_xy()
             ),
         );
     }
     for (name, value) in &found.metrics {
-        lines.line(name, format!("{value:.6e}"));
+        let counts = ["contacts", "rattlers"].contains(name);
+        let value = if counts {
+            format!("{value}")
+        } else {
+            format!("{value:.6e}")
+        };
+        lines.line(name, value);
     }
     lines.into_text()
 }
@@ -321,6 +352,11 @@ fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Valu
             "particle": s.particle,
             "beyond": s.beyond,
             "limit": SQUEEZE_LIMIT,
+        })),
+        "stress": found.observables(recording).map(|o| serde_json::json!({
+            "xx": o.stress_xx(),
+            "yy": o.stress_yy(),
+            "xy": o.stress_xy(),
         })),
         "metrics": found.metrics,
         "damage": found.damage.as_ref().map(ToString::to_string),

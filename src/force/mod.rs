@@ -33,6 +33,24 @@
 //! from −π to π at angle 0, where no two contacts of a particle lie. `U` is continuous with its first derivatives, also where
 //! contacts open and close. An isotropic rescaling turns no contact: `p = −dU/dV` holds with both forms.
 //!
+//! # Stress
+//!
+//! The stress that the contacts exert, averaged over the box of area `V = L_x L_y`, *tension positive*: a compressed packing has
+//! negative `σ_xx` and `σ_yy`, and `p = −(σ_xx + σ_yy)/2` is positive. From the derivative of `U` with an affine strain, `V σ_αβ =
+//! ∂U/∂ε_αβ` at fixed contact forces,
+//!
+//! ```text
+//! central:   σ_αβ = −(1/V) Σ_c f_c r_c n_α n_β
+//! gradient:  σ_αβ = −(1/V) Σ_c ( f_c r_c n_α n_β + τ_c (t_α n_β + n_α t_β)/2 )
+//! ```
+//!
+//! (γ/length), with `n` from one particle of the contact to the other (either way) and `t` turned from it by a quarter,
+//! counter-clockwise. The second term has no trace and is symmetric because `Σ τ_c = 0`. The share of the contours' own line
+//! tension and of the pressure in the droplets is not in it: it is isotropic in a free droplet and no contact's doing.
+//!
+//! `σ_xy` is a recorded metric, `stress_xy`; all three come from a recorded state by [`FrameForces`], `softjam info` and
+//! `softjam info --json`.
+//!
 //! # How far apart their packings lie
 //!
 //! N = 256, 15 random starts each, relaxed to `f_max ≤ 1e-12` γ. Medians of the root mean square and the largest displacement
@@ -50,12 +68,14 @@
 
 mod backbone;
 mod form;
+mod frame;
 mod sums;
 pub(crate) mod turning;
 
 pub use backbone::{Backbone, backbone, held};
 pub(crate) use form::tangent;
 pub use form::{Form, NetForces};
+pub use frame::FrameForces;
 
 use crate::contact::{ContactLaw, Contacts};
 use crate::domain::{Domain, Vec2};
@@ -132,7 +152,7 @@ pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
     net[first as usize] = sum_of_first;
 }
 
-/// `f_max`, the largest magnitude of a net force (force): the seed's measure of equilibrium, Saitoh 2.4.
+/// `f_max`, the largest magnitude of a net force (force): the measure of equilibrium, Saitoh 2.4.
 ///
 /// # Example
 ///
@@ -186,7 +206,7 @@ pub struct Observables {
     pub f_max: f64,
     /// Stored energy of the contact problem `U = ½ Σ_c δ_c f_c` (γ·length).
     pub energy: f64,
-    /// Stress `(σ_xx, σ_xy, σ_yy)`, tension positive: `σ_αβ = −(1/V) Σ_c f_c r_c n_α n_β` (γ/length).
+    /// Stress `(σ_xx, σ_xy, σ_yy)`, tension positive (γ/length); see the [module](self#stress).
     pub stress: [f64; 3],
     /// Number of contacts with `f > 0`.
     pub contacts: usize,
@@ -351,6 +371,34 @@ impl Observables {
             self.dt,
             self.stress[1],
         ]
+    }
+
+    /// `σ_xx` (γ/length), tension positive: negative in a compressed packing.
+    ///
+    /// ```
+    /// # use softjam::force::Observables;
+    /// let o = Observables { stress: [-0.2, 0.1, -0.4], ..Observables::default() };
+    /// assert_eq!((o.stress_xx(), o.stress_xy(), o.stress_yy()), (-0.2, 0.1, -0.4));
+    /// ```
+    #[must_use]
+    pub fn stress_xx(&self) -> f64 {
+        self.stress[0]
+    }
+
+    /// `σ_xy = σ_yx` (γ/length).
+    ///
+    /// See the example of [`stress_xx`](Self::stress_xx).
+    #[must_use]
+    pub fn stress_xy(&self) -> f64 {
+        self.stress[1]
+    }
+
+    /// `σ_yy` (γ/length), tension positive.
+    ///
+    /// See the example of [`stress_xx`](Self::stress_xx).
+    #[must_use]
+    pub fn stress_yy(&self) -> f64 {
+        self.stress[2]
     }
 
     /// Pressure `p = −tr σ/2 = (1/2V) Σ_c f_c r_c` (γ/length).

@@ -7,8 +7,9 @@ use crate::common::{
 use softjam::contact::solver::Method;
 use softjam::contact::{ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
-use softjam::force::{Form, NetForces, Observables};
+use softjam::force::{Form, FrameForces, NetForces, Observables};
 use softjam::packing::Packing;
+use softjam::relax::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
 
 /// The contact law to round-off.
@@ -311,5 +312,45 @@ fn a_relaxed_packing_of_the_gradient_form_is_a_minimum() {
             let there = energy(&exact(&moved(run.packing(), |p| shifts[p])));
             assert!(there > least, "φ = {phi}: {there} is below {least}");
         }
+    }
+}
+
+#[test]
+fn forces_and_stress_of_a_frame_are_those_of_the_run_it_comes_from() {
+    for forces in [Form::Central, Form::Gradient] {
+        let scene = Scene {
+            forces,
+            line_tension: 3.0,
+            ..scene(100, 0.87, 2)
+        };
+        let mut run = Relaxation::new(&scene).unwrap();
+        let mut torques = 0;
+        loop {
+            let frame = run.frame();
+            let found = FrameForces::of(run.packing(), &frame, scene.line_tension, forces);
+            assert_eq!(found.net(), run.net_forces(), "step {}", frame.step);
+            assert_eq!(
+                *found.observables(),
+                run.observables(),
+                "step {}",
+                frame.step
+            );
+            torques += found.torques().len();
+            if run.status() != Status::Running {
+                break;
+            }
+            // Contacts come and go in between.
+            for _ in 0..10 {
+                if run.status() == Status::Running {
+                    run.advance().unwrap();
+                }
+            }
+        }
+        assert_eq!(torques > 0, forces == Form::Gradient);
+        let o = run.observables();
+        assert!(
+            o.stress_xx() < 0.0 && o.stress_yy() < 0.0,
+            "it is compressed"
+        );
     }
 }
