@@ -59,7 +59,7 @@ pub(crate) use snapshot::{Snapshots, nanoseconds};
 use crate::packing::Packing;
 use crate::relax::{RelaxError, Relaxation, Stability, Status};
 use crate::scene::{Channels, Scene};
-use crate::text::shown;
+use crate::text::{counted, shown};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -265,11 +265,11 @@ impl Outcome {
 /// In words, such as `converged in 9 steps to a minimum`.
 impl core::fmt::Display for Outcome {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let steps = self.steps;
+        let steps = counted(self.steps, "step");
         if !self.converged {
-            return write!(f, "not converged within {steps} steps");
+            return write!(f, "not converged within {steps}");
         }
-        write!(f, "converged in {steps} steps")?;
+        write!(f, "converged in {steps}")?;
         match self.stability {
             Some(Stability::Minimum) => write!(f, " to a minimum"),
             Some(Stability::Saddle) => write!(f, " on a saddle: balanced, but not stable"),
