@@ -354,6 +354,7 @@ pub(super) fn go_on_behind(
         return Ok(());
     }
     ledger.find(recording.rows_left());
+    ledger.breaks_off_behind(run.step());
     let until = ledger.found_without_gap_from(run.step());
     while run.step() < until && run.status() == Status::Running {
         run.advance()?;

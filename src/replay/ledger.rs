@@ -32,6 +32,8 @@ pub(super) struct Ledger {
     metrics: u64,
     difference: Option<Difference>,
     bytes: Option<bytes::Recording>,
+    /// Behind this step rows may lack values: the file breaks off, maybe between the columns of a batch.
+    broken_off_behind: u64,
     /// Of another revision of the bits: how far it is off at worst, and what is allowed at present.
     deviation: Option<(Worst, f64)>,
 }
@@ -47,6 +49,7 @@ impl Ledger {
             metrics: 0,
             difference: None,
             bytes,
+            broken_off_behind: u64::MAX,
             deviation: None,
         }
     }
@@ -171,6 +174,11 @@ impl Ledger {
         until
     }
 
+    /// The file breaks off, and this was its last state.
+    pub fn breaks_off_behind(&mut self, step: u64) {
+        self.broken_off_behind = step;
+    }
+
     /// The end of both: nothing may be left.
     pub fn end(&mut self, end: End) -> Option<Compared> {
         self.miss();
@@ -183,7 +191,9 @@ impl Ledger {
 
     /// The first row that is awaited is missing.
     fn miss(&mut self) {
-        if let Some((&step, values)) = self.awaited.first_key_value() {
+        if let Some((&step, values)) = self.awaited.first_key_value()
+            && step <= self.broken_off_behind
+        {
             let k = values.iter().position(Option::is_some).unwrap_or(0);
             self.row(step, k, Row::Missing);
         }

@@ -3,6 +3,7 @@
 use crate::common::Random;
 use crate::files::{open, states};
 use crate::replay::{record, replay, scene};
+use softjam::force::METRICS;
 use softjam::frame::Frame;
 use softjam::replay::{Event, ReadError, Way};
 use softjam::scene::Scene;
@@ -103,6 +104,29 @@ fn a_recording_cut_anywhere_never_passes_for_a_whole_one() {
         recording.by_ref().for_each(drop);
         recording.is_closed()
     });
+}
+
+#[test]
+fn a_recording_cut_between_its_columns_is_what_its_scene_gives_as_far_as_it_goes() {
+    let bytes = record(&scene(), |_| {});
+    let columns = f64::from(METRICS.len() as u32);
+    let mut between = 0;
+    for k in 1..60 {
+        let part = &bytes[..bytes.len() * k / 60];
+        for way in [Way::Whole, Way::Segments(2)] {
+            // Without a state there is nothing to replay.
+            let Ok(verdict) = replay(part, way) else {
+                continue;
+            };
+            assert_eq!(verdict.difference, None, "{way:?}, {} bytes", part.len());
+            let rows = verdict.metrics as f64 / columns;
+            between += u32::from(rows.fract() != 0.0);
+        }
+    }
+    assert!(
+        between > 0,
+        "no cut was between columns: the test tests nothing"
+    );
 }
 
 #[test]
