@@ -5,7 +5,7 @@ use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, legend, legs_to_text};
 use crate::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
-use crate::text::{length, shown};
+use crate::text::{counted, length, shown};
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
@@ -139,10 +139,10 @@ fn text(header: &Header) -> String {
         ),
     };
     let mut parts = vec![format!(
-        "**{} deformable particles at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
+        "**{} at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
          {} × {}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
          {}.\n\n",
-        packing.len(),
+        counted(packing.len(), "deformable particle"),
         packing.coverage(),
         length(l.x),
         length(l.y),
