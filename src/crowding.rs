@@ -52,6 +52,51 @@ pub(crate) fn pairs(packing: &Packing) -> Result<usize, Crowd> {
     Ok(pairs)
 }
 
+/// Particles nearer to each other than this (smallest radii) stand on one point: in which direction they part is noise.
+const POINT: f64 = 1e-3;
+
+/// Cells along a side at most: their numbers have to be exact.
+const MOST_CELLS: f64 = (1_u64 << 48) as f64;
+
+/// The particles that stand where one of a lower number does, or on a periodic image of it, each as `[lower, particle]`; of those of
+/// one point the lowest. Time is `O(N log N)` however many stand on one point.
+pub(crate) fn coincident(packing: &Packing) -> Vec<[usize; 2]> {
+    let (domain, reach) = (packing.domain(), POINT * packing.smallest_radius());
+    let l = domain.lengths();
+    // No narrower than what is looked for on both sides, so that it lies in two cells of a row at most.
+    let count = |length: f64| libm::floor(length / (2.0 * reach)).clamp(1.0, MOST_CELLS);
+    let cells = [count(l.x), count(l.y)];
+    let cell = |at: Vec2| {
+        let place = |x: f64, length: f64, cells: f64| {
+            let k = libm::floor(x / length * cells);
+            (if k < 0.0 {
+                k + cells
+            } else if k >= cells {
+                k - cells
+            } else {
+                k
+            }) as u64
+        };
+        [place(at.x, l.x, cells[0]), place(at.y, l.y, cells[1])]
+    };
+    let mut lowest: BTreeMap<[u64; 2], Vec<u32>> = BTreeMap::new();
+    let mut found = Vec::new();
+    for (particle, &at) in packing.positions().iter().enumerate() {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+            .map(|[x, y]| cell(at + reach * Vec2::new(x, y)));
+        let near = corners.iter().filter_map(|cell| lowest.get(cell)).flatten();
+        let on = |other: &&u32| {
+            let other = packing.positions()[**other as usize];
+            domain.minimum_image(at - other).norm_squared() < reach * reach
+        };
+        match near.filter(on).min() {
+            Some(&other) => found.push([other as usize, particle]),
+            None => lowest.entry(cell(at)).or_default().push(particle as u32),
+        }
+    }
+    found
+}
+
 /// The first particle that more than [`MOST`] of `contacts` join to particles which are no smaller.
 #[cfg(feature = "recording")]
 pub(crate) fn contacts(radii: &[f64], contacts: &[[u32; 2]]) -> Option<Crowd> {
@@ -222,6 +267,48 @@ mod tests {
             let crowd = pairs(&packing).unwrap_err();
             assert_eq!(crowd.others, 99_999);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn coincident_particles_are_those_that_a_search_of_all_finds(
+            points in prop::collection::vec((0..7u8, 0..7u8, 0.0..1.2f64, 0.0..6.3f64), 1..60),
+            aspect in 0.05..2.0f64,
+        ) {
+            // On a lattice with a place on either edge, and a little beside it.
+            let l = Vec2::new(6.0 * aspect, 6.0);
+            let at = |&(x, y, r, angle): &(u8, u8, f64, f64)| {
+                let (sin, cos) = libm::sincos(angle);
+                let place = Vec2::new(f64::from(x) * l.x, f64::from(y) * l.y) / 6.0;
+                place + 1e-4 * r * Vec2::new(cos, sin)
+            };
+            let packing = Packing::new(
+                Domain::new(l.x, l.y).unwrap(),
+                vec![0.1; points.len()],
+                points.iter().map(at).collect(),
+            )
+            .unwrap();
+            let mut alone: Vec<usize> = Vec::new();
+            let mut all = Vec::new();
+            for k in 0..packing.len() {
+                match alone.iter().find(|j| packing.separation(**j, k).norm() < 1e-4) {
+                    Some(&j) => all.push([j, k]),
+                    None => alone.push(k),
+                }
+            }
+            prop_assert_eq!(coincident(&packing), all);
+        }
+    }
+
+    #[test]
+    fn a_million_particles_on_two_points_are_found_soon() {
+        let points: Vec<_> = (0..1_000_000)
+            .map(|k| (f64::from(k % 2), 0.5, 0.5))
+            .collect();
+        let packing = packing(&points, (400.0, 400.0));
+        let found = coincident(&packing);
+        assert_eq!(found.len(), 999_999, "the two are images of each other");
+        assert_eq!(found[0], [0, 1]);
     }
 
     #[test]

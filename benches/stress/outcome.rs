@@ -196,7 +196,7 @@ fn refused(scene: &Scene, error: &SceneError) -> Outcome {
             ..
         } => (
             "scene: box too small",
-            length_x.min(*length_y) < 5.0 * largest_radius,
+            length_x.min(*length_y) < 4.0 * largest_radius,
         ),
         SceneError::Range { .. } => (
             "scene: out of range",
@@ -225,7 +225,7 @@ fn failed(error: &RelaxError, packing: &Packing, steps: u64, check: Option<Check
                 ("box too small", check.is_some_and(|c| c.second_image > 0.0))
             }
             // The forces found fulfil the law, and bound a bulge of more than five of the largest radii.
-            ContactError::Absurd { .. } => ("absurd forces", check.is_some_and(|c| c.bulge > 5.0)),
+            ContactError::Diverged { .. } => ("diverged", check.is_some_and(|c| c.bulge > 5.0)),
             // These say that A is singular or that exchanges cycle: never right where contacts have directions of their own.
             ContactError::Solver(SolverError::NotPositiveDefinite { .. }) => {
                 ("not positive definite", false)

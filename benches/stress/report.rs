@@ -196,7 +196,7 @@ checked by code that shares nothing with the solver (`benches/stress/verify.rs`:
 all pairs and all periodic images): the contact law `f > 0`, `gap = 0` at contacts, `gap ≥ 0` elsewhere; the net forces against
 the threshold; that no second image of a neighbour touches. A step limit counts only if `f_max` is above the threshold; an
 error only if its reason is found to hold (a box is called too small only where a second image does overlap, forces are called
-absurd only where a bulge is bound by more than five radii). Of packings of up to 130 particles all eigenvalues of the stiffness
+diverged only where a bulge is bound by more than five radii). Of packings of up to 130 particles all eigenvalues of the stiffness
 have to bear out that they are a minimum or a saddle (`benches/stress/stiffness.rs`). *Wrong* is whatever fails this, a panic or a NaN.
 
 `f_max` in units of γ, of converged cases. *Law broken by*: largest gap at a contact or overlap elsewhere, relative to the largest

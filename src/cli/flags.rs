@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use clap::Args;
-use softjam::scene::{Channels, Scene, SceneError, SceneFields, Schedule};
+use softjam::scene::{Channels, DiskFields, Scene, SceneError, SceneFields, Schedule};
 use softjam::text::shown;
 use std::path::{Path, PathBuf};
 
@@ -33,10 +33,20 @@ pub struct SceneFlags {
     #[arg(long, value_name = "START", help_heading = PACKING)]
     start: Option<String>,
 
-    /// Start from a CSV file with the header x,y,radius and a comment `# box = L_x, L_y`; N, φ and radii are the file's, and
-    /// no disks are relaxed first.
+    /// Start from a CSV file with the header x,y,radius (or x,y,diameter) and a comment `# box = L_x, L_y`, `-` for standard
+    /// input; N, φ and radii are the file's, and the packing is taken as it stands.
     #[arg(long, value_name = "PACKING.csv", help_heading = PACKING)]
     file: Option<PathBuf>,
+
+    /// Put particles of the start file that stand on one point, or on a periodic image of it, beside each other instead of
+    /// refusing them.
+    #[arg(long, help_heading = PACKING)]
+    separate: bool,
+
+    /// Relax the undeformed disks of the start file first, those on one point put beside each other, for a packing that
+    /// overlaps too far for the model.
+    #[arg(long, help_heading = PACKING)]
+    relax_disks: bool,
 
     /// Line tension γ of the contours, the unit of force, 1e-100 … 1e100 [default: 1].
     #[arg(long, value_name = "GAMMA", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
@@ -157,6 +167,11 @@ impl SceneFlags {
             start: self.start.clone(),
             // A scene is text. What of a name is none is replaced in it; see `file_unlike_text`.
             file: (self.file.as_ref()).map(|path| path.to_string_lossy().into_owned()),
+            separate: self.separate.then_some(true),
+            disks: self.relax_disks.then(|| DiskFields {
+                relax: Some(true),
+                ..DiskFields::default()
+            }),
             line_tension: self.line_tension,
             threshold: self.threshold,
             steps: self.steps,

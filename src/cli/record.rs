@@ -8,7 +8,6 @@ use super::output::{Output, open_with};
 use super::{Verdict, talks, warn};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::BITS;
-use softjam::budget::Budget;
 use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
@@ -16,10 +15,11 @@ use softjam::packing::Packing;
 use softjam::record::{self, Format, Header, Leg, RecordError, Summary, Writer};
 use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Event, Recording};
-use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start, start};
+use softjam::scene::start::StartFile;
+use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start};
 use softjam::text::{counted, length, shown};
 use softjam::threads;
-use std::io::{BufRead as _, BufReader, IsTerminal as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,6 +35,8 @@ Examples:
   softjam record --mcap run.mcap                    for Foxglove; beside the .rrd with -o run.rrd
   softjam record --particles 1024 --spawn           and look on
   softjam record --file mine.csv -o mine.rrd        a packing of your own, relaxed as it stands
+  make-packing | softjam record --file - --relax-disks -o mine.rrd
+                                                    one that overlaps too far for it, through a pipe
 Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd
 
 RUN.rrd is written as RUN.rrd.part until it holds its first state, and then takes its place: from then on it can be read, and gone
@@ -54,7 +56,7 @@ pub struct Arguments {
         value_name = "RUN.rrd",
         help_heading = "Continue",
         conflicts_with_all = [
-            "scene", "particles", "phi", "aspect", "seed", "start", "file", "line_tension",
+            "scene", "particles", "phi", "aspect", "seed", "start", "file", "separate", "relax_disks", "line_tension",
             "dt_max", "contact_rule", "contact_solver",
         ]
     )]
@@ -95,21 +97,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 
 fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let origin = match &arguments.from {
-        None => match arguments.scene.file_unlike_text() {
-            None => {
-                let scene = arguments.scene.scene()?;
-                if let Start::File { path, .. } = &scene.start {
-                    check_start_file(path.as_ref(), arguments.memory.budget())?;
-                }
-                Origin::Scene(scene.pinned()?)
-            }
-            Some(path) => {
-                check_start_file(path, arguments.memory.budget())?;
-                let scene = arguments.scene.scene()?;
-                let (start, packing) = start::from_file(path)?;
-                Origin::Packing(Scene { start, ..scene }, packing)
-            }
-        },
+        None => beginning(arguments)?,
         Some(path) => recorded_frame(path, arguments)?,
     };
     let (scene, legs) = (origin.scene().clone(), origin.legs());
@@ -137,7 +125,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let start = Instant::now();
     let mut run = match origin {
         Origin::Scene(scene) => Relaxation::new(&scene)?,
-        Origin::Packing(scene, packing) => Relaxation::of_packing(&scene, packing)?,
+        Origin::File(scene, packing) => Relaxation::of_start(&scene, packing)?,
         Origin::Frame(from) => from.run()?,
     };
     let disks = start.elapsed();
@@ -251,14 +239,15 @@ impl Phase {
 /// Where a run begins.
 enum Origin {
     Scene(Scene),
-    Packing(Scene, Packing),
+    /// With the packing of a start file, its disks not yet relaxed.
+    File(Scene, Packing),
     Frame(Box<Continuation>),
 }
 
 impl Origin {
     fn scene(&self) -> &Scene {
         match self {
-            Self::Scene(scene) | Self::Packing(scene, _) => scene,
+            Self::Scene(scene) | Self::File(scene, _) => scene,
             Self::Frame(from) => &from.scene,
         }
     }
@@ -266,7 +255,7 @@ impl Origin {
     fn legs(&self) -> Vec<Leg> {
         match self {
             Self::Frame(from) => from.legs.clone(),
-            Self::Scene(_) | Self::Packing(..) => Vec::new(),
+            Self::Scene(_) | Self::File(..) => Vec::new(),
         }
     }
 }
@@ -326,6 +315,32 @@ impl Continuation {
         }
         Ok(run)
     }
+}
+
+/// The scene of the flags; its start file is read here, and only here, since it may be a pipe.
+fn beginning(arguments: &Arguments) -> anyhow::Result<Origin> {
+    let scene = arguments.scene.scene()?;
+    let Start::File {
+        path,
+        blake3,
+        preparation,
+    } = &scene.start
+    else {
+        return Ok(Origin::Scene(scene));
+    };
+    // The name as it was given: no scene holds one that is not UTF-8.
+    let path = arguments.scene.file().unwrap_or(Path::new(path));
+    let file = StartFile::read_within(path, arguments.memory.budget())?;
+    let start = file.start(blake3.as_deref(), *preparation)?;
+    let (packing, coincidences) = file.prepared(*preparation)?;
+    if let Some(first) = coincidences.first() {
+        warn(&format!(
+            "particles of one point are put beside each other, {} of {}; the first: {first}",
+            coincidences.len(),
+            packing.len()
+        ));
+    }
+    Ok(Origin::File(Scene { start, ..scene }, packing))
 }
 
 /// The frame to go on from, and its scene with what the flags change about its end and its recording.
@@ -389,35 +404,13 @@ fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> 
     }
 }
 
-/// Refuses a start file that is too long for the budget.
-fn check_start_file(path: &Path, budget: Budget) -> Result<(), SceneError> {
-    let length = std::fs::metadata(path).map_or(0, |file| file.len());
-    let allowed = budget.allow_piece("the text", length);
-    allowed.map_err(|exceeded| SceneError::StartFile {
-        path: path.display().to_string(),
-        line: 0,
-        problem: exceeded.to_string(),
-    })
-}
-
-/// The lines of a start file: about as many as particles.
-fn lines_in(path: &str) -> Result<usize, SceneError> {
-    let unreadable = |source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    Ok(BufReader::new(file).split(b'\n').count())
-}
-
 /// Refuses a scene that would bring the machine down instead of relaxing.
 fn fits_in_memory(origin: &Origin, memory: &MemoryFlag) -> Result<(), SceneError> {
     let scene = origin.scene();
-    let particles = match (origin, &scene.start) {
-        (Origin::Frame(from), _) => from.packing.len(),
-        (Origin::Packing(_, packing), _) => packing.len(),
-        (Origin::Scene(_), Start::File { path, .. }) => lines_in(path)?,
-        (Origin::Scene(_), Start::Random | Start::Hexagonal) => scene.particles,
+    let particles = match origin {
+        Origin::Frame(from) => from.packing.len(),
+        Origin::File(_, packing) => packing.len(),
+        Origin::Scene(scene) => scene.particles,
     };
     let needed = scene.memory_estimate(particles);
     // Where the system does not tell, it is asked the hard way.

@@ -220,11 +220,15 @@ mod tests {
             let wave = |c: usize| 0.2 + 0.1 * libm::sin(1.3 * c as f64 + 0.2 * f64::from(step));
             (0..29).map(wave).collect()
         };
-        let mut absurd = forces(40);
-        absurd[7] = 1e3;
+        let mut diverged = forces(40);
+        diverged[7] = 1e3;
         let exact = |p: usize| {
             let own = [p.checked_sub(1), (p < 29).then_some(p)];
-            let sum: f64 = own.into_iter().flatten().map(|c| most_of(absurd[c])).sum();
+            let sum: f64 = own
+                .into_iter()
+                .flatten()
+                .map(|c| most_of(diverged[c]))
+                .sum();
             sum * 0.5 * 0.16
         };
         let cut = |first: u32| {
@@ -232,7 +236,7 @@ mod tests {
             for step in first..40 {
                 bulges.bound(&pairs, &forces(step), &radii, 0.16);
             }
-            bulges.bound(&pairs, &absurd, &radii, 0.16);
+            bulges.bound(&pairs, &diverged, &radii, 0.16);
             let grown: Vec<f64> = (0..30).map(|p| bulges.of(p)).collect();
             assert_eq!(bulges.cut(2.5, exact).map(|c| c.0), Some(7));
             let cut: Vec<f64> = (0..30).map(|p| bulges.of(p)).collect();

@@ -17,7 +17,7 @@
 //! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
 //! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over. Their
 //! gaps are positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too
-//! wide (`bulges.rs`), cannot change a bit of the answer. The forces of an unfinished exchange can be absurd, and bulges as wide as
+//! wide (`bulges.rs`), cannot change a bit of the answer. The forces of an unfinished exchange can be anything, and bulges as wide as
 //! many particles; they are cut short, and then all bounds are the exact sums.
 //!
 //! See the example of [`ContactLaw`], through which this is used.
@@ -269,7 +269,7 @@ impl ContactLaw {
         self.bulges
             .bound(pairs, forces, packing.radii(), per_radius);
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
-        self.absurd = None;
+        self.diverged = None;
         if self.bulges.largest().is_nan() || self.bulges.largest() > widest {
             let loaded = Loaded {
                 packing,
@@ -277,7 +277,7 @@ impl ContactLaw {
                 forces,
                 per_radius,
             };
-            self.absurd = self.bulges.cut(widest, |p| loaded.bulge(p));
+            self.diverged = self.bulges.cut(widest, |p| loaded.bulge(p));
         }
         self.cover(packing, self.bulges.largest());
     }
@@ -295,13 +295,17 @@ impl ContactLaw {
         self.covered = largest;
     }
 
-    /// An answer that leaves out a second image of a neighbour, or that bulges absurdly, is none.
+    /// An answer that leaves out a second image of a neighbour, or that bulges without bound, is none.
     pub(super) fn check_images(&self, packing: &Packing) -> Result<(), ContactError> {
         let reach = |p: usize| packing.radii()[p] + self.bulges.of(p);
         let farthest = packing.largest_radius() + self.bulges.largest();
-        if self.absurd.is_none() && 4.0 * farthest <= packing.domain().shortest() {
+        if self.diverged.is_none() && 4.0 * farthest <= packing.domain().shortest() {
             return Ok(());
         }
+        debug_assert!(
+            self.bulges.largest() <= self.covered,
+            "pairs in reach are listed"
+        );
         let tolerance = ACCEPTED * self.allowed(self.scale());
         let loaded = Loaded {
             packing,
@@ -309,7 +313,9 @@ impl ContactLaw {
             forces: &self.forces,
             per_radius: self.per_radius(),
         };
-        if let Some((particle, other)) = second_image(loaded, reach, tolerance) {
+        if let Some((particle, other)) =
+            second_image(loaded, self.neighbors.pairs(), reach, tolerance)
+        {
             return Err(ContactError::BoxTooSmall {
                 particle,
                 other,
@@ -317,8 +323,8 @@ impl ContactLaw {
                 shortest: packing.domain().shortest(),
             });
         }
-        if let Some((particle, bulge)) = self.absurd {
-            return Err(ContactError::Absurd {
+        if let Some((particle, bulge)) = self.diverged {
+            return Err(ContactError::Diverged {
                 particle,
                 bulge,
                 radius: packing.radii()[particle],

@@ -39,10 +39,11 @@ pub enum ContactError {
     },
     /// The forces are so large that a contour would bulge by several radii.
     #[error(
-        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces are absurd, \
-         as after a step that was too long or in a start that overlaps far too much"
+        "particle {particle} of radius {radius} would bulge by up to {bulge:.3e}: the forces diverged, as after a step that was too \
+         long or in a start that overlaps far too much; a start from a file can have its disks relaxed first (--relax-disks, or relax \
+         = true in [disks])"
     )]
-    Absurd {
+    Diverged {
         /// The particle.
         particle: usize,
         /// The bound of its bulge (length).

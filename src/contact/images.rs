@@ -41,44 +41,34 @@ impl Loaded<'_> {
 /// A particle and one whose second image its contour overlaps by more than `tolerance` (length), the lower first; the first such
 /// pair in order.
 ///
-/// `reach` bounds the contour of each particle from outside (length); a wider bound finds the same. Costs O(N) for each
-/// particle whose reach exceeds a quarter of the shorter side, nothing else.
+/// `reach` bounds the contour of each particle from outside (length); a wider bound finds the same. Whose second image is in reach, its
+/// nearest is too: `near` holds at least the pairs `i < j` that reach each other, ascending.
 pub(super) fn second_image(
     particles: Loaded<'_>,
+    near: &[[u32; 2]],
     reach: impl Fn(usize) -> f64,
     tolerance: f64,
 ) -> Option<(usize, usize)> {
     let packing = particles.packing;
     let half = 0.5 * packing.domain().shortest();
-    // Of two particles that reach half a side together, one reaches a quarter.
-    let far = (0..packing.len()).filter(|&i| 2.0 * reach(i) > half);
-    let mut first = None;
-    for i in far {
-        for j in 0..packing.len() {
-            let (together, pair) = (reach(i) + reach(j), (i.min(j), i.max(j)));
-            if together <= half || first.is_some_and(|first| first <= pair) {
-                continue;
-            }
-            let touches = farther_images(packing, i, j, together).any(|separation| {
+    let touches = |&(i, j): &(usize, usize)| {
+        let together = reach(i) + reach(j);
+        // No image but the nearest is nearer than half a side.
+        together > half
+            && farther_images(packing, i, j, together).any(|separation| {
                 let (normal, distance) = unit_and_length(separation);
                 let to_j = Direction::of(-normal);
-                let [lower, higher] = [(i, to_j), (j, to_j.opposite())];
-                let [lower, higher] = if i <= j {
-                    [lower, higher]
-                } else {
-                    [higher, lower]
-                };
-                let gap = distance
-                    - particles.contour(lower.0, lower.1)
-                    - particles.contour(higher.0, higher.1);
+                let gap =
+                    distance - particles.contour(i, to_j) - particles.contour(j, to_j.opposite());
                 gap.is_nan() || gap < -tolerance
-            });
-            if touches {
-                first = Some(pair);
-            }
-        }
-    }
-    first
+            })
+    };
+    let own = (0..packing.len()).map(|i| (i, i)).find(touches);
+    let pairs = near.iter().map(|pair| (pair[0] as usize, pair[1] as usize));
+    let other = pairs
+        .take_while(|pair| own.is_none_or(|own| *pair < own))
+        .find(touches);
+    other.or(own)
 }
 
 /// `r_i − r_j` to all images of `j` closer than `reach`, but for the nearest.

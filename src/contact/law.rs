@@ -104,7 +104,7 @@ pub struct ContactLaw {
     pub(super) searches: [Search; 2],
     pub(super) patch: Patch,
     /// Particles whose bulge is beyond all reason, the first of them.
-    pub(super) absurd: Option<(usize, f64)>,
+    pub(super) diverged: Option<(usize, f64)>,
     pub(super) offending: Vec<Offence>,
     /// How far the particles may have moved since the neighbour list was looked at (length).
     pub(super) moved: f64,
@@ -196,7 +196,7 @@ impl ContactLaw {
             tolerated: 0.0,
             searches: Default::default(),
             patch: Patch::default(),
-            absurd: None,
+            diverged: None,
             offending: Vec::new(),
             moved: f64::INFINITY,
             scale: 0.0,

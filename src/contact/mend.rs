@@ -146,7 +146,7 @@ impl ContactLaw {
         }
     }
 
-    /// Lists the pairs that offend around the patches of a round; `false` if the forces are absurd.
+    /// Lists the pairs that offend around the patches of a round; `false` if the forces diverge.
     fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
         let per_radius = self.per_radius();
         let widest = WIDEST_BULGE * packing.largest_radius();

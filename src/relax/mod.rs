@@ -94,7 +94,24 @@ impl Relaxation {
     /// ```
     pub fn new(scene: &Scene) -> Result<Self, RelaxError> {
         scene.validate()?;
-        let mut packing = start::packing(scene)?;
+        Self::of_start(scene, start::packing(scene)?)
+    }
+
+    /// Frame 0 of a scene whose start is at hand: disks relaxed if the scene says so, the contact problem solved.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    ///
+    /// ```
+    /// use softjam::{relax::Relaxation, scene::{Scene, start}};
+    ///
+    /// let scene = Scene { particles: 32, ..Scene::default() };
+    /// let run = Relaxation::of_start(&scene, start::packing(&scene).unwrap()).unwrap();
+    /// assert_eq!(run.frame().digest(), Relaxation::new(&scene).unwrap().frame().digest());
+    /// ```
+    pub fn of_start(scene: &Scene, mut packing: Packing) -> Result<Self, RelaxError> {
+        scene.validate()?;
         let disks = scene
             .starts_from_disks()
             .then(|| disks::relax(&mut packing, &scene.disks, scene.line_tension));

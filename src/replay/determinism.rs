@@ -174,7 +174,7 @@ pub fn determinism(
     let ledger = Ledger::new(scene.channels.metrics, bytes);
     let mut verdict = Determinism {
         origin: match recording.from_step() {
-            _ if scene.starts_from_disks() && same_revision => Origin::Scene,
+            _ if !scene.starts_from_file() && same_revision => Origin::Scene,
             0 => Origin::Positions,
             _ => Origin::Frame,
         },

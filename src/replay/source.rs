@@ -110,11 +110,9 @@ impl Header {
     pub fn check(&self, path: &str) -> Result<(), ReadError> {
         let (claimed, held) = (self.scene.particles, self.radii.len());
         let phi = coverage(&self.radii, self.domain);
-        let problem = if self.scene.starts_from_disks() && claimed != held {
-            {
-                let claimed = counted(claimed, "particle");
-                format!("the scene has {claimed}, the file holds radii of {held}")
-            }
+        let problem = if !self.scene.starts_from_file() && claimed != held {
+            let claimed = counted(claimed, "particle");
+            format!("the scene has {claimed}, the file holds radii of {held}")
         } else if phi > 0.0 && phi < 1.3 + 1e-9 {
             return Ok(());
         } else {

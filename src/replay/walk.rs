@@ -133,14 +133,14 @@ fn ended(run: &Relaxation) -> Option<Difference> {
 
 /// A run of the scene from its start, or how the recorded radii and box differ from the scene's.
 ///
-/// A start from a file is what the first frame recorded of it; the file itself need not be at hand.
+/// A start from a file is what the first frame recorded of it, its disks relaxed if they were; the file itself need not be at hand.
 fn first_run(
     scene: &Scene,
     legs: &[Leg],
     first: &Frame,
     recorded: &Packing,
 ) -> Result<Result<Relaxation, Difference>, RelaxError> {
-    if !scene.starts_from_disks() {
+    if scene.starts_from_file() {
         return Ok(Ok(if first.step == 0 {
             Relaxation::of_packing(scene, recorded.clone())?
         } else {

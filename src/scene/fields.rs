@@ -1,6 +1,6 @@
 //! A scene with gaps: what a file or the flags say, before defaults are filled in.
 
-use super::{Channels, Minimizer, Radii, Scene, SceneError, Species, Start};
+use super::{Channels, Minimizer, Preparation, Radii, Scene, SceneError, Species, Start};
 use crate::contact::Rule;
 use crate::contact::solver::Method;
 use crate::disks::DiskParameters;
@@ -38,6 +38,7 @@ pub struct SceneFields {
     pub start: Option<String>,
     pub file: Option<String>,
     pub file_blake3: Option<String>,
+    pub separate: Option<bool>,
     pub seed: Option<u64>,
     pub line_tension: Option<f64>,
     pub threshold: Option<f64>,
@@ -49,7 +50,7 @@ pub struct SceneFields {
     pub contact_solver: Option<Method>,
     pub contact_tolerance: Option<f64>,
     pub fire: Option<Fire>,
-    pub disks: Option<DiskParameters>,
+    pub disks: Option<DiskFields>,
     pub contours: Option<ContourStyle>,
     pub channels: Option<Channels>,
 }
@@ -67,6 +68,41 @@ pub struct Spread {
     pub min: f64,
     /// Largest radius (length).
     pub max: f64,
+}
+
+/// The table `[disks]` of a scene file.
+///
+/// ```
+/// let disks = softjam::scene::SceneFields::from_toml("disks.relax = true").unwrap().disks.unwrap();
+/// assert_eq!((disks.relax, disks.steps), (Some(true), None));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DiskFields {
+    /// Whether the disks of a start file are relaxed first; those of other starts always are.
+    pub relax: Option<bool>,
+    /// See [`DiskParameters::threshold`].
+    pub threshold: Option<f64>,
+    /// See [`DiskParameters::steps`].
+    pub steps: Option<u64>,
+}
+
+impl DiskFields {
+    fn overridden_by(self, flags: Self) -> Self {
+        Self {
+            relax: flags.relax.or(self.relax),
+            threshold: flags.threshold.or(self.threshold),
+            steps: flags.steps.or(self.steps),
+        }
+    }
+
+    fn parameters(self) -> DiskParameters {
+        let default = DiskParameters::default();
+        DiskParameters {
+            threshold: self.threshold.unwrap_or(default.threshold),
+            steps: self.steps.unwrap_or(default.steps),
+        }
+    }
 }
 
 impl SceneFields {
@@ -145,6 +181,17 @@ impl SceneFields {
             self.file = None;
             self.file_blake3 = None;
         }
+        let mut disks = self.disks.unwrap_or_default();
+        if flags.start.is_some() && flags.file.is_none() {
+            // What is done to the packing of a file goes with the file.
+            self.separate = None;
+            disks.relax = None;
+        }
+        disks = disks.overridden_by(flags.disks.unwrap_or_default());
+        if flags.file.is_some() && disks.relax != Some(true) {
+            disks = DiskFields::default();
+        }
+        self.disks = Some(disks);
         if flags.file.is_some() {
             // A start file brings these with it.
             self.particles = None;
@@ -153,10 +200,9 @@ impl SceneFields {
             self.species = None;
             self.spread = None;
             self.seed = None;
-            self.disks = None;
         }
         macro_rules! first_of {
-            ($($field:ident),*) => { Self { $($field: flags.$field.or(self.$field)),* } };
+            ($($field:ident),*) => { Self { $($field: flags.$field.or(self.$field)),*, disks: self.disks } };
         }
         first_of!(
             particles,
@@ -167,6 +213,7 @@ impl SceneFields {
             start,
             file,
             file_blake3,
+            separate,
             seed,
             line_tension,
             threshold,
@@ -178,7 +225,6 @@ impl SceneFields {
             contact_solver,
             contact_tolerance,
             fire,
-            disks,
             contours,
             channels
         )
@@ -215,7 +261,7 @@ impl SceneFields {
             contact_solver: self.contact_solver.unwrap_or_default(),
             contact_tolerance: self.contact_tolerance.unwrap_or(default.contact_tolerance),
             fire: self.fire.unwrap_or_default(),
-            disks: self.disks.unwrap_or_default(),
+            disks: self.disks.unwrap_or_default().parameters(),
             contours: self.contours.unwrap_or(default.contours),
             channels: self.channels.unwrap_or_default(),
         };
@@ -242,11 +288,22 @@ impl SceneFields {
                 "there is no start file that could have this hash",
             ));
         }
+        let relax = self.disks.and_then(|disks| disks.relax);
         match (kind, &self.file) {
             ("random" | "hexagonal", Some(file)) => Err(conflict(
                 "file",
                 format!("\"{file}\""),
                 "only start = \"file\" reads a file",
+            )),
+            ("random" | "hexagonal", None) if self.separate == Some(true) => Err(conflict(
+                "separate",
+                "true".into(),
+                "only particles of a start file stand on one point",
+            )),
+            ("random" | "hexagonal", None) if relax == Some(false) => Err(conflict(
+                "disks.relax",
+                "false".into(),
+                "its disks are always relaxed; disks.steps = 0 leaves them where they are",
             )),
             ("random", None) => Ok(Start::Random),
             ("hexagonal", None) => Ok(Start::Hexagonal),
@@ -259,23 +316,31 @@ impl SceneFields {
                     ("species", self.species.as_ref().map(|_| "[…]".to_owned())),
                     ("spread", self.spread.map(|_| "{…}".to_owned())),
                 ];
-                let disks = self.disks.filter(|d| *d != DiskParameters::default());
-                match numbers.into_iter().find_map(|(n, v)| v.map(|v| (n, v))) {
-                    Some((field, value)) => Err(conflict(
-                        field,
-                        value,
-                        "particles, radii and box come from the file",
-                    )),
-                    None if disks.is_some() => Err(conflict(
+                if let Some((field, value)) =
+                    numbers.into_iter().find_map(|(n, v)| v.map(|v| (n, v)))
+                {
+                    let why = "particles, radii and box come from the file";
+                    return Err(conflict(field, value, why));
+                }
+                let preparation = match (relax, self.separate) {
+                    (Some(true), _) => Preparation::Relaxed,
+                    (_, Some(true)) => Preparation::Separated,
+                    _ => Preparation::AsItStands,
+                };
+                let disks = self.disks.unwrap_or_default().parameters();
+                if preparation != Preparation::Relaxed && disks != DiskParameters::default() {
+                    return Err(conflict(
                         "disks",
                         "{…}".into(),
-                        "a packing from a file is relaxed as it stands, not as disks first; leave [disks] out",
-                    )),
-                    None => Ok(Start::File {
-                        path: path.clone(),
-                        blake3: self.file_blake3.clone(),
-                    }),
+                        "the disks of a file are left as they stand unless relax = true in [disks] (--relax-disks) has \
+                         them relaxed first",
+                    ));
                 }
+                Ok(Start::File {
+                    path: path.clone(),
+                    blake3: self.file_blake3.clone(),
+                    preparation,
+                })
             }
             ("file", None) => Err(SceneError::Needs {
                 field: "start".into(),

@@ -20,9 +20,10 @@ mod print;
 pub mod schedule;
 pub mod start;
 mod start_file;
+mod start_table;
 mod validate;
 
-pub use fields::SceneFields;
+pub use fields::{DiskFields, SceneFields};
 pub use schedule::{Channels, Schedule};
 
 use crate::contact::solver::Method;
@@ -96,13 +97,33 @@ pub enum Start {
     Random,
     /// A hexagonal lattice that fits the box exactly, its aspect the nearest possible to the one asked for.
     Hexagonal,
-    /// A CSV file; see [`start::read_csv`]. It brings radii and box with it, and its disks are not relaxed.
+    /// A CSV file; see [`start::read_csv`]. It brings radii and box with it.
     File {
-        /// Path of the file.
+        /// Path of the file; `-` is standard input.
         path: String,
         /// BLAKE3 of the file in hexadecimal; if given, the file must match.
         blake3: Option<String>,
+        /// What is done to its packing before the run.
+        preparation: Preparation,
     },
+}
+
+/// What is done to the packing of a start file before its run.
+///
+/// ```
+/// use softjam::scene::{Preparation, Scene, Start};
+/// let scene = Scene::from_toml("file = \"mine.csv\"\ndisks.relax = true").unwrap();
+/// assert!(matches!(scene.start, Start::File { preparation: Preparation::Relaxed, .. }));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preparation {
+    /// Nothing: the run begins with the packing as it stands, and particles that stand on one point are refused.
+    #[default]
+    AsItStands,
+    /// Particles that stand on one point are put beside each other; see [`start::StartFile::prepared`].
+    Separated,
+    /// So are they here, and then the undeformed disks are relaxed, as those of a random start.
+    Relaxed,
 }
 
 /// Which minimiser relaxes the packing.
@@ -258,11 +279,11 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: String,
     },
-    /// The box is too small for the minimum image.
+    /// The box is so small that disks could touch two images of each other.
     #[error(
         "particles = {particles} with phi = {phi} and aspect = {aspect} give a box of {length_x:.4} × {length_y:.4}, \
-         whose shorter side is less than 5 times the largest radius {largest_radius}: nearest images would be ambiguous; \
-         take more particles, a lower phi or an aspect nearer to 1"
+         in which disks of the largest radius {largest_radius} could touch two images of each other; take more particles, a \
+         lower phi or an aspect nearer to 1"
     )]
     BoxTooSmall {
         /// Number of particles.
@@ -356,22 +377,37 @@ impl Scene {
         if let Start::File {
             path,
             blake3: hash @ None,
+            ..
         } = &mut self.start
         {
-            let bytes = start_file::read_file(path.as_ref())?;
-            *hash = Some(blake3::hash(&bytes).to_hex().to_string());
+            *hash = Some(start::StartFile::read(&*path)?.blake3());
         }
         Ok(self)
     }
 
-    /// Whether the centres are relaxed as undeformed disks first; a start from a file is taken as it is.
+    /// Whether the centres are relaxed as undeformed disks first; those of a start file are if it is asked for.
     ///
     /// ```
-    /// assert!(softjam::scene::Scene::default().starts_from_disks());
+    /// use softjam::scene::Scene;
+    /// assert!(Scene::default().starts_from_disks());
+    /// assert!(!Scene::from_toml("file = \"mine.csv\"").unwrap().starts_from_disks());
     /// ```
     #[must_use]
     pub fn starts_from_disks(&self) -> bool {
-        !matches!(self.start, Start::File { .. })
+        match self.start {
+            Start::Random | Start::Hexagonal => true,
+            Start::File { preparation, .. } => preparation == Preparation::Relaxed,
+        }
+    }
+
+    /// Whether particles, radii and box come from a file.
+    ///
+    /// ```
+    /// assert!(!softjam::scene::Scene::default().starts_from_file());
+    /// ```
+    #[must_use]
+    pub fn starts_from_file(&self) -> bool {
+        matches!(self.start, Start::File { .. })
     }
 
     /// The contact law that the scene asks for.

@@ -1,6 +1,6 @@
 //! The scene as a commented TOML text.
 
-use super::{Radii, Scene, Start};
+use super::{Preparation, Radii, Scene, Start};
 use crate::text::is_hidden;
 use core::fmt::Write as _;
 
@@ -25,7 +25,12 @@ impl Scene {
     }
 
     fn write_packing(&self, page: &mut Page) {
-        if let Start::File { path, blake3 } = &self.start {
+        if let Start::File {
+            path,
+            blake3,
+            preparation,
+        } = &self.start
+        {
             page.field(
                 "Start: \"random\", \"hexagonal\" or \"file\".",
                 "start",
@@ -43,6 +48,11 @@ impl Scene {
                     quoted(hash),
                 );
             }
+            page.field(
+                "Particles of the file that stand on one point, or on a periodic image of it, are put beside each other; false refuses them.",
+                "separate",
+                *preparation != Preparation::AsItStands,
+            );
         } else {
             page.field(
                 "Number of particles, 1 … 10000000.",
@@ -157,7 +167,12 @@ impl Scene {
         page.line("mixing_decay", number(fire.mixing_decay));
         page.line("first_dt", number(fire.first_dt));
         page.line("least_dt", number(fire.least_dt));
-        page.text("\n# The undeformed disks that the run starts from: relaxed to this f_max, or for that many steps.\n[disks]");
+        if self.starts_from_file() {
+            page.text("\n# With relax = true the undeformed disks of the file are relaxed first: to this f_max, or for that many steps.\n[disks]");
+            page.line("relax", self.starts_from_disks());
+        } else {
+            page.text("\n# The undeformed disks that the run starts from: relaxed to this f_max, or for that many steps.\n[disks]");
+        }
         page.line("threshold", number(self.disks.threshold));
         page.line("steps", self.disks.steps);
     }

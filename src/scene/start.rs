@@ -8,9 +8,9 @@
 //! curve (G. M. Morton, IBM Ltd., 1966), so that particles near each other have numbers near each other and stand near
 //! each other in memory. Numbers mean nothing to the physics.
 
-pub use super::start_file::{from_file, read_csv};
+pub use super::start_file::{Coincidence, StartFile, read_csv};
 
-use super::{Radii, Scene, SceneError, Species, Start, start_file};
+use super::{Radii, Scene, SceneError, Species, Start};
 use crate::domain::{Domain, Vec2};
 use crate::packing::Packing;
 use core::f64::consts::PI;
@@ -34,8 +34,15 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// ```
 pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
     let (packing, aspect) = match &scene.start {
-        Start::File { path, blake3 } => {
-            return start_file::of_scene(path.as_ref(), blake3.as_deref());
+        Start::File {
+            path,
+            blake3,
+            preparation,
+        } => {
+            let file = StartFile::read(path)?;
+            file.start(blake3.as_deref(), *preparation)?;
+            let (packing, _) = file.prepared(*preparation)?;
+            return Ok(packing);
         }
         Start::Random => {
             let mut random = Random::new(scene.seed);
@@ -91,9 +98,19 @@ pub fn packing(scene: &Scene) -> Result<Packing, SceneError> {
     Ok(packing)
 }
 
-/// Whether the box is too small for the nearest image to be the only one that counts.
-pub(super) fn is_small(packing: &Packing) -> bool {
-    packing.domain().shortest() < 5.0 * packing.largest_radius()
+/// Whether two undeformed disks could touch two images of each other, or one its own, wherever they stand. What contours do shows in
+/// each step of a run.
+fn is_small(packing: &Packing) -> bool {
+    let mut largest = [0.0; 2];
+    for &radius in packing.radii() {
+        if radius > largest[0] {
+            largest = [radius, largest[0]];
+        } else if radius > largest[1] {
+            largest[1] = radius;
+        }
+    }
+    let shortest = packing.domain().shortest();
+    2.0 * (largest[0] + largest[1]) > shortest || 2.0 * largest[0] > shortest
 }
 
 /// The place of a point of the box along Morton's curve through 2¹⁶ × 2¹⁶ squares: the bits of the square's column and

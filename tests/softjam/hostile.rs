@@ -10,7 +10,9 @@ use softjam::packing::Packing;
 use softjam::record::{Format, Header, Snapshot, Writer};
 use softjam::relax::Relaxation;
 use softjam::replay::{Event, ReadError, Recording};
-use softjam::scene::{Channels, Scene, SceneError, SceneFields, Schedule, Start, start};
+use softjam::scene::{
+    Channels, Preparation, Scene, SceneError, SceneFields, Schedule, Start, start,
+};
 use std::io::{Cursor, Read};
 use std::time::{Duration, Instant};
 
@@ -340,6 +342,7 @@ fn a_start_file_with_any_name_goes_into_the_scene_and_comes_back() {
         let start = Start::File {
             path: path.to_owned(),
             blake3: None,
+            preparation: Preparation::AsItStands,
         };
         let scene = Scene {
             start,
@@ -356,25 +359,42 @@ fn a_start_file_with_any_name_goes_into_the_scene_and_comes_back() {
 fn start_files_with_particles_on_one_point_are_refused_by_name() {
     let folder = Folder::new();
     let path = folder.path().join("coincident.csv");
-    let mut text = String::from("# box = 60, 60\nx,y,radius\n20,20,0.5\n");
-    text.push_str(&"7,7,0.5\n".repeat(300));
-    std::fs::write(&path, text).expect("written");
-    let file = Start::File {
-        path: path.display().to_string(),
-        blake3: None,
+    // On one point, and so near to it that each has a direction.
+    let on_one_point = |_| "7,7,0.5\n".to_owned();
+    let nearly = |k: u32| {
+        let [x, y] = [k / 20, k % 20].map(|n| 7.0 + 0.001 * f64::from(n));
+        format!("{x},{y},0.5\n")
     };
-    let scene = Scene {
-        start: file,
-        ..Scene::default()
-    };
-    let error = soon(|| start::packing(&scene)).expect_err("refused");
-    let told = error.to_string();
-    assert!(matches!(error, SceneError::StartFile { .. }), "{told}");
-    assert!(
-        told.contains("299 particles overlap particle 1")
-            && told.contains("in which direction they part"),
-        "{told}"
-    );
+    let cases: [(String, &str); 2] = [
+        (
+            (0..300).map(on_one_point).collect(),
+            "line 5: particle 2 (line 5, at 7, 7) stands on the point of particle 1 (line 4, at 7, 7) (and 298 more such)",
+        ),
+        (
+            (0..300).map(nearly).collect(),
+            "line 4: 299 particles overlap particle 1",
+        ),
+    ];
+    for (rows, words) in cases {
+        let text = format!("# box = 60, 60\nx,y,radius\n20,20,0.5\n{rows}");
+        std::fs::write(&path, text).expect("written");
+        let file = Start::File {
+            path: path.display().to_string(),
+            blake3: None,
+            preparation: Preparation::AsItStands,
+        };
+        let scene = Scene {
+            start: file,
+            ..Scene::default()
+        };
+        let error = soon(|| start::packing(&scene)).expect_err("refused");
+        let told = error.to_string();
+        assert!(matches!(error, SceneError::StartFile { .. }), "{told}");
+        assert!(
+            told.contains(words) && told.contains("in which direction they part"),
+            "{told}"
+        );
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod start_file;
 
 use softjam::disks::DiskParameters;
 use softjam::relax::Relaxation;
-use softjam::scene::{Radii, Scene, Species, Start};
+use softjam::scene::{Preparation, Radii, Scene, Species, Start};
 
 /// Asserts that a scene text is refused and that the message holds all of `words`.
 #[track_caller]
@@ -158,8 +158,66 @@ fn start_that_contradicts_other_fields_is_refused() {
         file = "a.csv" / species = [{ radius = 0.5, fraction = 1.0 }] => species & start = "file"
         file = "a.csv" / spread = { min = 0.4, max = 0.5 }            => spread & start = "file"
         start = "hexagonal" / particles = 65    => particles = 65 is & hexagonal
+        file = "a.csv" / disks.steps = 7        => disks = {…} cannot & start = "file" & relax = true in [disks]
+        file = "a.csv" / disks.relax = false / disks.threshold = 1e-4 => disks = {…} cannot
+        separate = true                         => separate = true cannot & start = "random"
+        start = "hexagonal" / disks.relax = false => disks.relax = false cannot & disks.steps = 0
         "#,
     );
+}
+
+#[test]
+fn what_is_done_to_a_start_file_comes_from_the_file_or_the_flags() {
+    use softjam::scene::{DiskFields, SceneFields};
+    let preparation = |text: &str, flags: &SceneFields| {
+        let fields = SceneFields::from_toml(text).unwrap();
+        match fields.overridden_by(flags.clone()).into_scene().unwrap() {
+            Scene {
+                start: Start::File { preparation, .. },
+                disks,
+                ..
+            } => Some((preparation, disks.steps)),
+            _ => None,
+        }
+    };
+    let default = DiskParameters::default().steps;
+    let none = SceneFields::default();
+    let file = SceneFields {
+        file: Some("b.csv".into()),
+        ..SceneFields::default()
+    };
+    let relax = SceneFields {
+        disks: Some(DiskFields {
+            relax: Some(true),
+            ..DiskFields::default()
+        }),
+        ..file.clone()
+    };
+    let start = SceneFields {
+        start: Some("random".into()),
+        ..SceneFields::default()
+    };
+    let separate = "file = \"a.csv\"\nseparate = true";
+    let steps = "[disks]\nsteps = 9";
+    let relaxed = "file = \"a.csv\"\n[disks]\nrelax = true\nsteps = 9";
+    for (text, flags, expected) in [
+        (
+            "file = \"a.csv\"",
+            &none,
+            Some((Preparation::AsItStands, default)),
+        ),
+        (separate, &none, Some((Preparation::Separated, default))),
+        (relaxed, &none, Some((Preparation::Relaxed, 9))),
+        (relaxed, &file, Some((Preparation::Relaxed, 9))),
+        // Parameters of the disks of a random start are not for the file that takes its place, unless its disks are relaxed.
+        (steps, &file, Some((Preparation::AsItStands, default))),
+        (steps, &relax, Some((Preparation::Relaxed, 9))),
+        (separate, &relax, Some((Preparation::Relaxed, default))),
+        (separate, &start, None),
+        ("file = \"a.csv\"\ndisks.relax = false", &start, None),
+    ] {
+        assert_eq!(preparation(text, flags), expected, "{text}");
+    }
 }
 
 #[test]
@@ -238,7 +296,22 @@ fn values_that_never_were_a_text_are_validated_too() {
 #[test]
 fn every_scene_survives_the_way_through_its_text() {
     type Change = fn(&mut Scene);
-    let cases: [Change; 6] = [
+    let cases: [Change; 8] = [
+        |s| {
+            s.start = Start::File {
+                path: "a.csv".into(),
+                blake3: None,
+                preparation: Preparation::Separated,
+            }
+        },
+        |s| {
+            s.disks.steps = 77;
+            s.start = Start::File {
+                path: "-".into(),
+                blake3: None,
+                preparation: Preparation::Relaxed,
+            }
+        },
         |s| s.seed = u64::MAX,
         |s| (s.phi, s.aspect, s.dt_max) = (0.1 + 0.2, 1.0 / 3.0, Some(1e-300)),
         |s| {
@@ -259,6 +332,7 @@ fn every_scene_survives_the_way_through_its_text() {
             s.start = Start::File {
                 path: "a \"quoted\"\\path\nof 'two' lines.csv".into(),
                 blake3: Some("00".repeat(32)),
+                preparation: Preparation::AsItStands,
             }
         },
     ];

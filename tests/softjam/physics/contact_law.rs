@@ -56,7 +56,7 @@ fn forces_and_gaps_are_never_negative_and_never_both_positive() {
         0..60u64,
     );
     let (at_contacts, elsewhere) = (Cell::new(0.0f64), Cell::new(f64::MIN));
-    let (refused, absurd) = (Cell::new(0), Cell::new(0));
+    let (refused, diverged) = (Cell::new(0), Cell::new(0));
     TestRunner::new(config)
         .run(&cases, |(seed, particles, phi, ratio, steps)| {
             let packing = random_packing(&mut Random::new(seed), particles, phi, ratio, steps);
@@ -66,9 +66,9 @@ fn forces_and_gaps_are_never_negative_and_never_both_positive() {
                     refused.set(refused.get() + 1);
                     return Err(TestCaseError::reject("box too small"));
                 }
-                // Forces may be called absurd only of a start in which disks lie in each other.
-                Err(ContactError::Absurd { .. }) if nested(&packing) => {
-                    absurd.set(absurd.get() + 1);
+                // Forces may diverge only of a start in which disks lie in each other.
+                Err(ContactError::Diverged { .. }) if nested(&packing) => {
+                    diverged.set(diverged.get() + 1);
                     return Err(TestCaseError::reject("disks lie in each other"));
                 }
                 Err(error) => return Err(TestCaseError::fail(error.to_string())),
@@ -93,7 +93,7 @@ fn forces_and_gaps_are_never_negative_and_never_both_positive() {
         })
         .unwrap();
     println!("{} packings in too small a box", refused.get());
-    assert!(absurd.get() <= 3, "{} with absurd forces", absurd.get());
+    assert!(diverged.get() <= 3, "{} diverged", diverged.get());
     assert_at_most(
         "gap at a contact over the largest overlap",
         at_contacts.get(),

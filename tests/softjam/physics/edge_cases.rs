@@ -7,7 +7,7 @@ use softjam::contact::{ContactError, ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
 use softjam::packing::Packing;
 use softjam::relax::{RelaxError, Relaxation, Status};
-use softjam::scene::{Radii, Scene, Start, start};
+use softjam::scene::{Preparation, Radii, Scene, Start, start};
 
 const METHODS: [Method; 3] = [
     Method::ConjugateGradient,
@@ -81,22 +81,39 @@ fn coincident_centres_of_a_start_file_relax_apart() {
     let path = folder.path().join("coincident.csv");
     let rows = "1,1,0.5\n1,1,0.5\n4,4,0.5\n4,4,0.7\n4,4,0.6\n7,2,0.5\n";
     std::fs::write(&path, format!("# box = 9, 9\nx,y,radius\n{rows}")).unwrap();
-    let scene = Scene {
-        start: Start::File {
-            path: path.to_str().unwrap().into(),
-            blake3: None,
-        },
-        ..Scene::default()
-    };
-    let mut run = Relaxation::new(&scene).unwrap();
-    while run.status() == Status::Running {
-        run.advance().unwrap();
-        let frame = run.frame();
-        assert!(frame.validate(6, run.packing().domain()).is_ok());
+    // Separated beforehand, relaxed as disks, or left to the model by whoever makes the packing himself.
+    for preparation in [
+        Preparation::Separated,
+        Preparation::Relaxed,
+        Preparation::AsItStands,
+    ] {
+        let scene = Scene {
+            start: Start::File {
+                path: path.to_str().unwrap().into(),
+                blake3: None,
+                preparation,
+            },
+            ..Scene::default()
+        };
+        let start = Relaxation::new(&scene);
+        let mut run = match preparation {
+            Preparation::AsItStands => {
+                assert!(start.is_err());
+                let packing = start::read_csv(&path, None).unwrap();
+                Relaxation::of_packing(&scene, packing).unwrap()
+            }
+            _ => start.unwrap(),
+        };
+        assert_eq!(run.disks().is_some(), preparation == Preparation::Relaxed);
+        while run.status() == Status::Running {
+            run.advance().unwrap();
+            let frame = run.frame();
+            assert!(frame.validate(6, run.packing().domain()).is_ok());
+        }
+        assert_eq!(run.status(), Status::Converged);
+        // FIRE comes to rest where the contours hardly touch.
+        assert!(run.packing().separation(0, 1).norm() > 1.0 - 1e-9);
     }
-    assert_eq!(run.status(), Status::Converged);
-    // FIRE comes to rest where the contours hardly touch.
-    assert!(run.packing().separation(0, 1).norm() > 1.0 - 1e-9);
 }
 
 #[test]

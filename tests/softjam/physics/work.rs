@@ -6,7 +6,7 @@ use softjam::contact::{ContactLaw, Work};
 use softjam::force::Backbone;
 use softjam::packing::Packing;
 use softjam::relax::{Relaxation, Status};
-use softjam::scene::{Scene, Start};
+use softjam::scene::{Preparation, Scene, Start};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -242,6 +242,7 @@ fn run_that_starts_from_a_file_or_a_frame_relaxes_no_disks() {
         start: Start::File {
             path: path.to_str().unwrap().to_owned(),
             blake3: None,
+            preparation: Preparation::AsItStands,
         },
         ..Scene::default()
     })
