@@ -4,8 +4,8 @@
 //! whatever their sizes; among the few particles that fit around one without overlap, six are no smaller.
 
 use crate::domain::{Domain, Vec2};
+use crate::octaves::{self, Grid, Seat};
 use crate::packing::Packing;
-use core::ops::Range;
 use std::collections::BTreeMap;
 
 /// Particles no smaller than itself that a particle may overlap or touch. Centres strewn at random at φ = 1.3 come to about 5 on
@@ -23,25 +23,13 @@ pub(crate) struct Crowd {
 /// The number of pairs of overlapping disks, or the first particle found that overlaps more than [`MOST`] which are no smaller. Memory is
 /// proportional to the number of particles, and coincident ones are found at once.
 pub(crate) fn pairs(packing: &Packing) -> Result<usize, Crowd> {
-    // By size, in octaves: cells that suit the large would hold any number of small ones.
-    let mut octaves: BTreeMap<u64, Vec<Seat>> = BTreeMap::new();
-    let particles = packing.positions().iter().zip(packing.radii());
-    for (particle, (&at, &radius)) in (0..).zip(particles) {
-        let exponent = radius.to_bits() >> 52;
-        octaves.entry(exponent).or_default().push(Seat {
-            at,
-            radius,
-            particle,
-        });
-    }
-    let domain = packing.domain();
-    let grids: Vec<Grid> = octaves.values().map(|s| Grid::new(domain, s)).collect();
+    let (domain, grids) = (packing.domain(), octaves::by_size(packing, 0.0));
     let mut pairs = 0;
     for (k, small) in grids.iter().enumerate() {
-        for seat in &small.seats {
+        for seat in small.seats() {
             let mut larger = 0;
             for grid in &grids[k..] {
-                let (no_smaller, counted) = grid.around(domain, seat, MOST - larger);
+                let (no_smaller, counted) = around(grid, domain, seat, MOST - larger);
                 (larger, pairs) = (larger + no_smaller, pairs + counted);
                 if larger > MOST {
                     return Err(Crowd::of(packing, seat.particle as usize));
@@ -125,106 +113,28 @@ impl Crowd {
     }
 }
 
-#[derive(Clone, Copy, Default)]
-struct Seat {
-    at: Vec2,
-    radius: f64,
-    particle: u32,
-}
-
-/// Particles of about one size in cells no narrower than two of their diameters can reach: O(N) of them at most.
-struct Grid {
-    columns: usize,
-    rows: usize,
-    per_length: Vec2,
-    seats: Vec<Seat>,
-    /// Cell c has `seats[first[c]..first[c + 1]]`.
-    first: Vec<u32>,
-}
-
-impl Grid {
-    fn new(domain: Domain, particles: &[Seat]) -> Self {
-        let largest = particles
-            .iter()
-            .fold(0.0, |m: f64, seat| m.max(seat.radius));
-        let lengths = domain.lengths();
-        // A float too large for the type becomes the largest number there is.
-        let count = |length: f64, most: usize| ((length / (2.0 * largest)) as usize).clamp(1, most);
-        let columns = count(lengths.x, particles.len());
-        let rows = count(lengths.y, particles.len().div_ceil(columns));
-        let mut grid = Self {
-            columns,
-            rows,
-            per_length: Vec2::new(columns as f64, rows as f64).component_div(&lengths),
-            seats: vec![Seat::default(); particles.len()],
-            first: vec![0; columns * rows + 1],
-        };
-        let cells: Vec<usize> = particles.iter().map(|seat| grid.cell(seat.at)).collect();
-        for cell in &cells {
-            grid.first[*cell] += 1;
+/// How many particles of an octave that are no smaller overlap `seat`, and how many of these pairs count here: one of equals at its
+/// lower particle. Ends when there are more than `enough`.
+fn around(grid: &Grid, domain: Domain, seat: &Seat, enough: usize) -> (usize, usize) {
+    let one = |holds: bool| usize::from(holds);
+    let (mut no_smaller, mut counted) = (0, 0);
+    for others in grid.near(seat.at) {
+        // Without a branch: nobody could guess who is near.
+        for other in others {
+            let sum = seat.radius + other.radius;
+            let near = domain.minimum_image(seat.at - other.at).norm_squared() < sum * sum;
+            let another = one(near) & one(other.particle != seat.particle);
+            let larger = one(other.radius > seat.radius);
+            let equal = one(other.radius == seat.radius);
+            let first = one(seat.particle < other.particle);
+            no_smaller += another & (larger | equal);
+            counted += another & (larger | equal & first);
         }
-        let mut end = 0;
-        for count in &mut grid.first {
-            end += *count;
-            *count = end;
+        if no_smaller > enough {
+            break;
         }
-        for (seat, cell) in particles.iter().zip(cells).rev() {
-            grid.first[cell] -= 1;
-            grid.seats[grid.first[cell] as usize] = *seat;
-        }
-        grid
     }
-
-    fn place(&self, at: Vec2) -> (usize, usize) {
-        let at = at.component_mul(&self.per_length);
-        let (column, row) = (at.x as usize, at.y as usize);
-        // A product may round up to the number of cells.
-        (column.min(self.columns - 1), row.min(self.rows - 1))
-    }
-
-    fn cell(&self, at: Vec2) -> usize {
-        let (column, row) = self.place(at);
-        row * self.columns + column
-    }
-
-    /// How many particles that are no smaller overlap `seat`, and how many of these pairs count here: one of equals at its lower
-    /// particle. Ends when there are more than `enough`.
-    fn around(&self, domain: Domain, seat: &Seat, enough: usize) -> (usize, usize) {
-        let (column, row) = self.place(seat.at);
-        let one = |holds: bool| usize::from(holds);
-        let (mut no_smaller, mut counted) = (0, 0);
-        for row in beside(row, self.rows).into_iter().flatten() {
-            for columns in beside(column, self.columns) {
-                let cells = row * self.columns + columns.start..row * self.columns + columns.end;
-                let others = self.first[cells.start] as usize..self.first[cells.end] as usize;
-                // Without a branch: nobody could guess who is near.
-                for other in &self.seats[others] {
-                    let sum = seat.radius + other.radius;
-                    let near = domain.minimum_image(seat.at - other.at).norm_squared() < sum * sum;
-                    let another = one(near) & one(other.particle != seat.particle);
-                    let larger = one(other.radius > seat.radius);
-                    let equal = one(other.radius == seat.radius);
-                    let first = one(seat.particle < other.particle);
-                    no_smaller += another & (larger | equal);
-                    counted += another & (larger | equal & first);
-                }
-                if no_smaller > enough {
-                    return (no_smaller, counted);
-                }
-            }
-        }
-        (no_smaller, counted)
-    }
-}
-
-/// A cell and those beside it along a periodic line, each once: one stretch, or two where the line closes.
-fn beside(place: usize, cells: usize) -> [Range<usize>; 2] {
-    match place {
-        _ if cells <= 3 => [0..cells, 0..0],
-        0 => [0..2, cells - 1..cells],
-        last if last + 1 == cells => [last - 1..cells, 0..1],
-        _ => [place - 1..place + 2, 0..0],
-    }
+    (no_smaller, counted)
 }
 
 #[cfg(test)]

@@ -73,6 +73,7 @@ pub mod frame;
 #[doc = include_str!("model.md")]
 pub mod model {}
 pub mod neighbors;
+mod octaves;
 pub mod packing;
 #[cfg(feature = "recording")]
 pub mod record;

@@ -5,6 +5,7 @@
 //! a replay that starts with a fresh list walks the same bits.
 
 use crate::domain::{Domain, Vec2, nearest};
+use crate::octaves;
 use crate::packing::Packing;
 use crate::wide::wide;
 
@@ -171,16 +172,13 @@ impl CellList {
     fn pairs_within(&mut self, packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
         let longest = 2.0 * packing.largest_radius() + reach;
         let n = packing.len();
-        let Some(grid) = Grid::new(packing.domain(), longest, n) else {
-            // Fewer than three cells along a side: every pair is a neighbour pair of cells anyway.
-            let near = |i: u32, j: u32| {
-                let (i, j) = (i as usize, j as usize);
-                let sum = packing.radii()[i] + packing.radii()[j] + reach;
-                packing.separation(i, j).norm_squared() < sum * sum
-            };
-            pairs.clear();
-            for i in 0..n as u32 {
-                pairs.extend((i + 1..n as u32).filter(|&j| near(i, j)).map(|j| [i, j]));
+        let grid = Grid::new(packing.domain(), longest, n);
+        // Fewer than three cells along a side, or cells that hold many: a narrow box, or a few particles much larger than the others.
+        let Some(grid) = grid.filter(|grid| n <= CROWDED * grid.columns * grid.rows) else {
+            if n <= FEW {
+                pairs_of_all(packing, reach, pairs);
+            } else {
+                pairs_by_size(packing, reach, pairs);
             }
             return;
         };
@@ -245,6 +243,47 @@ impl CellList {
         }
         count
     }
+}
+
+/// Particles a cell on average, from which on they are looked for by size.
+const CROWDED: usize = 16;
+
+/// So few particles are looked through as they are.
+const FEW: usize = 64;
+
+/// The pairs of surfaces closer than `reach`, ascending, from a look at every two particles.
+fn pairs_of_all(packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
+    let n = packing.len() as u32;
+    let near = |i: u32, j: u32| {
+        let (i, j) = (i as usize, j as usize);
+        let sum = packing.radii()[i] + packing.radii()[j] + reach;
+        packing.separation(i, j).norm_squared() < sum * sum
+    };
+    pairs.clear();
+    for i in 0..n {
+        pairs.extend((i + 1..n).filter(|&j| near(i, j)).map(|j| [i, j]));
+    }
+}
+
+/// The same, each particle against those near it that are of its octave of sizes or a larger one.
+fn pairs_by_size(packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
+    let (domain, grids) = (packing.domain(), octaves::by_size(packing, reach));
+    pairs.clear();
+    for (k, small) in grids.iter().enumerate() {
+        for seat in small.seats() {
+            for (larger, grid) in grids[k..].iter().enumerate() {
+                for other in grid.near(seat.at).flatten() {
+                    let (i, j) = (seat.particle, other.particle);
+                    let sum = seat.radius + other.radius + reach;
+                    let apart = domain.minimum_image(seat.at - other.at).norm_squared();
+                    if apart < sum * sum && (larger > 0 || i < j) {
+                        pairs.push([i.min(j), i.max(j)]);
+                    }
+                }
+            }
+        }
+    }
+    pairs.sort_unstable();
 }
 
 /// Counting sort of `items` into `sorted` by a number below `numbers`; equal ones keep their order. Those of number c
@@ -370,6 +409,28 @@ mod tests {
                     }
                 }
             }
+            prop_assert_eq!(list.pairs(), all);
+        }
+
+        #[test]
+        fn pairs_by_size_are_those_of_all(
+            points in prop::collection::vec((0.0..1.0f64, 0.0..1.0f64, 0.01..0.4f64), 1..120),
+            lengths in (0.3..8.0f64, 0.3..8.0f64),
+            intruder in 0.0..4.0f64,
+            reach in 0.0..0.5f64,
+        ) {
+            let mut radii: Vec<f64> = points.iter().map(|p| p.2).collect();
+            radii[0] += intruder;
+            let at = |p: &(f64, f64, f64)| Vec2::new(p.0 * lengths.0, p.1 * lengths.1);
+            let positions = points.iter().map(at).collect();
+            let domain = Domain::new(lengths.0, lengths.1).unwrap();
+            let packing = Packing::new(domain, radii, positions).unwrap();
+            let (mut by_size, mut all) = (Vec::new(), Vec::new());
+            pairs_by_size(&packing, reach, &mut by_size);
+            pairs_of_all(&packing, reach, &mut all);
+            prop_assert_eq!(&by_size, &all);
+            let mut list = NeighborList::new();
+            list.update(&packing, reach, 0.0);
             prop_assert_eq!(list.pairs(), all);
         }
 

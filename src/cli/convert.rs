@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(value_name = "IN")]
     input: PathBuf,
 
-    /// The file to write; a name that ends in .mcap gives MCAP, any other .rrd.
+    /// The file to write; its name ends in .rrd or .mcap.
     #[arg(value_name = "OUT")]
     output: PathBuf,
 
@@ -49,8 +49,8 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let output = Output::named(&arguments.output);
-    output.check(&[Some(&arguments.input)], arguments.force)?;
+    let inputs = [Some(arguments.input.as_path())];
+    let output = Output::named(&arguments.output, &inputs, arguments.force)?;
     end_when_interrupted()?;
     let mut recording = Recording::open_within(&arguments.input, arguments.memory.budget())?;
     let held = recording.scene().channels;

@@ -2,11 +2,12 @@
 
 use super::lines::Lines;
 use super::memory::MemoryFlag;
-use super::output::{Output, end_when_interrupted};
+use super::output::{check_absent, check_place, end_when_interrupted};
 use super::{Verdict, report};
 use softjam::budget::Budget;
 use softjam::figure::{self, CHART_WIDTH, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
 use softjam::frame::Frame;
+use softjam::record::NewFile;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
 use softjam::text::shown;
@@ -131,9 +132,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         return Err(FigureError::Nothing(problem).into());
     }
     let inputs: Vec<Option<&Path>> = arguments.files.iter().map(|f| Some(f.as_path())).collect();
-    Output::named(output).check(&inputs, arguments.force)?;
+    check_place(output, &inputs)?;
+    check_absent(output, arguments.force)?;
     end_when_interrupted()?;
-    let file = Output::named(output).begin(arguments.force)?;
+    let file = NewFile::create(output, arguments.force)?;
     let budget = arguments.memory.budget();
     let svg = if arguments.fmax {
         let runs = arguments.files.iter().map(|path| fall(path, budget));

@@ -37,9 +37,8 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let output = Output::named(&arguments.output);
     let inputs: Vec<_> = arguments.parts.iter().map(|p| Some(p.as_path())).collect();
-    output.check(&inputs, arguments.force)?;
+    let output = Output::named(&arguments.output, &inputs, arguments.force)?;
     end_when_interrupted()?;
     let budget = arguments.memory.budget();
     let parts = arguments.parts.iter();

@@ -33,7 +33,8 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0  done, and the verdict is good (converged; replay agrees)
   1  could not be done: I/O, a damaged file, a numerical failure, an interruption
-  2  the request makes no sense: a bad flag, an invalid scene, a file that is in the way or is being written
+  2  the request makes no sense: a bad flag, an invalid scene, a name that says no format, a file that is in the way or is
+     being written
   3  done, and the verdict is bad (not converged within the step limit; info: not converged, for whatever reason; replay differs;
      forces out of balance)";
 
@@ -171,6 +172,8 @@ fn exit_code(error: &anyhow::Error) -> u8 {
             RecordError::Exists { .. }
                 | RecordError::Busy { .. }
                 | RecordError::Input { .. }
+                | RecordError::Name { .. }
+                | RecordError::NotMcap { .. }
                 | RecordError::Twice { .. }
         );
         if is_in_the_way { 2 } else { 1 }

@@ -5,61 +5,83 @@ use softjam::record::{self, Format, NewFile, RecordError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file to write.
+/// A recording to write.
 pub struct Output {
     pub path: PathBuf,
     pub format: Format,
 }
 
 impl Output {
-    /// A file whose name says its format.
-    pub fn named(path: &Path) -> Self {
-        Self {
+    /// A recording whose name says its format; it has to be none of `inputs`, and may replace another only with `force`.
+    pub fn named(path: &Path, inputs: &[Option<&Path>], force: bool) -> Result<Self, RecordError> {
+        check_place(path, inputs)?;
+        let format = Format::named(path)?;
+        check_absent(path, force)?;
+        Ok(Self {
             path: path.to_owned(),
-            format: Format::of(path),
-        }
+            format,
+        })
     }
 
-    /// Refuses a file that cannot be created, that is one of `inputs`, or that exists without `force`.
-    pub fn check(&self, inputs: &[Option<&Path>], force: bool) -> Result<(), RecordError> {
-        let path = self.path.display().to_string();
-        let create = |kind, reason: String| RecordError::Create {
-            path: path.clone(),
-            source: io::Error::new(kind, reason),
-        };
-        if self.path.is_dir() {
-            return Err(create(
-                io::ErrorKind::IsADirectory,
-                "it is a folder; name a file in it".to_owned(),
-            ));
+    /// [`named`](Self::named) of an MCAP file.
+    pub fn mcap(path: &Path, inputs: &[Option<&Path>], force: bool) -> Result<Self, RecordError> {
+        check_place(path, inputs)?;
+        if !Format::Mcap.suits(path) {
+            return Err(RecordError::NotMcap {
+                path: path.display().to_string(),
+            });
         }
-        let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            let problem = format!("there is no folder {}", folder.display());
-            return Err(create(io::ErrorKind::NotFound, problem));
-        }
-        let part = record::part_of(&self.path);
-        for input in inputs.iter().flatten() {
-            if record::same_file(input, &self.path) {
-                return Err(RecordError::Input { path });
-            }
-            // What a killed process has left would be overwritten while it is read.
-            if record::same_file(input, &part) {
-                let path = part.display().to_string();
-                return Err(RecordError::Input { path });
-            }
-        }
-        if force || !self.path.exists() {
-            Ok(())
-        } else {
-            Err(RecordError::Exists { path })
-        }
+        check_absent(path, force)?;
+        Ok(Self {
+            path: path.to_owned(),
+            format: Format::Mcap,
+        })
     }
 
     /// Begins the file: nobody else can write it from now on.
     pub fn begin(&self, force: bool) -> Result<NewFile, RecordError> {
         NewFile::create(&self.path, force)
     }
+}
+
+/// Refuses a file that cannot be created, or that is one of `inputs`.
+pub fn check_place(path: &Path, inputs: &[Option<&Path>]) -> Result<(), RecordError> {
+    let create = |kind, reason: String| RecordError::Create {
+        path: path.display().to_string(),
+        source: io::Error::new(kind, reason),
+    };
+    if path.is_dir() {
+        return Err(create(
+            io::ErrorKind::IsADirectory,
+            "it is a folder; name a file in it".to_owned(),
+        ));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        let problem = format!("there is no folder {}", folder.display());
+        return Err(create(io::ErrorKind::NotFound, problem));
+    }
+    let part = record::part_of(path);
+    for input in inputs.iter().flatten() {
+        // What a killed process has left would be overwritten while it is read.
+        for output in [path, part.as_path()] {
+            if record::same_file(input, output) {
+                let path = output.display().to_string();
+                return Err(RecordError::Input { path });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a file that exists without `force`.
+pub fn check_absent(path: &Path, force: bool) -> Result<(), RecordError> {
+    if force || !path.exists() {
+        return Ok(());
+    }
+    Err(RecordError::Exists {
+        path: path.display().to_string(),
+    })
 }
 
 /// Ctrl-C and SIGTERM end the process and leave nothing of a file that is not whole.

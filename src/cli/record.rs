@@ -12,7 +12,7 @@ use softjam::droplet::validity::Validity;
 use softjam::force::Observables;
 use softjam::frame::Frame;
 use softjam::packing::Packing;
-use softjam::record::{self, Format, Header, Leg, RecordError, Summary, Writer};
+use softjam::record::{self, Header, Leg, RecordError, Summary, Writer};
 use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Event, Recording};
 use softjam::scene::start::StartFile;
@@ -66,11 +66,11 @@ pub struct Arguments {
     #[arg(long, value_name = "K", requires = "from", help_heading = "Continue")]
     step: Option<u64>,
 
-    /// File to record into; a name that ends in .mcap gives MCAP [default: softjam.rrd, if there is no --mcap].
+    /// File to record into; its name ends in .rrd or .mcap [default: softjam.rrd, if no MCAP is asked for].
     #[arg(long, short, value_name = "RUN.rrd", help_heading = RECORDING)]
     output: Option<PathBuf>,
 
-    /// File to record into as MCAP, alone or beside the one of -o.
+    /// File to record into as MCAP, alone or beside the one of -o; its name ends in .mcap.
     #[arg(long, value_name = "RUN.mcap", help_heading = RECORDING)]
     mcap: Option<PathBuf>,
 
@@ -96,13 +96,21 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 }
 
 fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
-    let origin = match &arguments.from {
-        None => beginning(arguments)?,
-        Some(path) => recorded_frame(path, arguments)?,
+    let (origin, outputs) = match &arguments.from {
+        None => {
+            let scene = arguments.scene.scene()?;
+            // Before a start file is waited for, which may be a pipe.
+            let outputs = outputs(arguments, &scene)?;
+            (beginning(arguments, scene)?, outputs)
+        }
+        Some(path) => {
+            let origin = recorded_frame(path, arguments)?;
+            let outputs = outputs(arguments, origin.scene())?;
+            (origin, outputs)
+        }
     };
     let (scene, legs) = (origin.scene().clone(), origin.legs());
     fits_in_memory(&origin, &arguments.memory)?;
-    let outputs = outputs(arguments, &scene)?;
     // Newton's method carries the forces along with the positions; only round-off holds it up.
     let (least, reason) = match scene.minimizer {
         Minimizer::Fire => (
@@ -169,29 +177,24 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
 
 /// The files to write, which can be written.
 fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordError> {
-    let mut outputs: Vec<Output> = arguments.output.iter().map(|p| Output::named(p)).collect();
-    if let Some(path) = &arguments.mcap {
-        if outputs.iter().any(|o| record::same_file(&o.path, path)) {
-            let path = path.display().to_string();
-            return Err(RecordError::Twice { path });
-        }
-        outputs.push(Output {
-            path: path.clone(),
-            format: Format::Mcap,
-        });
-    }
-    if outputs.is_empty() {
-        outputs.push(Output::named(Path::new("softjam.rrd")));
-    }
     let start = match &scene.start {
         Start::File { path, .. } => arguments.scene.file().or(Some(Path::new(path))),
         Start::Random | Start::Hexagonal => None,
     };
     let inputs = [arguments.from.as_deref(), start, arguments.scene.path()];
-    for output in &outputs {
-        output.check(&inputs, arguments.force)?;
+    let force = arguments.force;
+    let (named, mcap) = (arguments.output.as_deref(), arguments.mcap.as_deref());
+    if let (Some(one), Some(other)) = (named, mcap)
+        && record::same_file(one, other)
+    {
+        let path = other.display().to_string();
+        return Err(RecordError::Twice { path });
     }
-    Ok(outputs)
+    // Without a name for either it is this.
+    let named = named.or_else(|| mcap.is_none().then_some(Path::new("softjam.rrd")));
+    let named = named.map(|path| Output::named(path, &inputs, force));
+    let mcap = mcap.map(|path| Output::mcap(path, &inputs, force));
+    named.into_iter().chain(mcap).collect()
 }
 
 /// What Ctrl-C and SIGTERM find: nothing to lose while the disks relax, a recording to close afterwards.
@@ -303,7 +306,7 @@ impl Continuation {
         };
         let run = begin(&self.scene, self.packing, self.frame)?;
         // Its replay would have nothing to run.
-        if run.status() != Status::Running && !self.scene.starts_from_disks() {
+        if run.status() != Status::Running && self.scene.starts_from_file() {
             let step = run.step();
             return Err(SceneError::Needs {
                 field: "from".to_owned(),
@@ -317,9 +320,8 @@ impl Continuation {
     }
 }
 
-/// The scene of the flags; its start file is read here, and only here, since it may be a pipe.
-fn beginning(arguments: &Arguments) -> anyhow::Result<Origin> {
-    let scene = arguments.scene.scene()?;
+/// Where a run of a scene begins; its start file is read here, and only here, since it may be a pipe.
+fn beginning(arguments: &Arguments, scene: Scene) -> anyhow::Result<Origin> {
     let Start::File {
         path,
         blake3,

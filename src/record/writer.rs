@@ -91,12 +91,12 @@ struct Failure {
 }
 
 impl Writer {
-    /// Creates the file of a recording, in the [format that its name says](Format::of), and starts it; an existing file is
+    /// Creates the file of a recording, in the [format that its name says](Format::named), and starts it; an existing file is
     /// replaced only if `replace` says so, and not before the first snapshot has been written.
     ///
     /// # Errors
     ///
-    /// Those of [`NewFile::create`].
+    /// Those of [`NewFile::create`], and [`RecordError::Name`] where the name says no format.
     ///
     /// ```
     /// use softjam::{record::{Header, Writer}, relax::Relaxation, scene::Scene};
@@ -111,7 +111,7 @@ impl Writer {
         replace: bool,
         header: Header,
     ) -> Result<Self, RecordError> {
-        let format = Format::of(&path);
+        let format = Format::named(&path)?;
         Self::create_as(format, path, replace, header)
     }
 

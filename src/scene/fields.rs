@@ -332,8 +332,8 @@ impl SceneFields {
                     return Err(conflict(
                         "disks",
                         "{…}".into(),
-                        "the disks of a file are left as they stand unless relax = true in [disks] (--relax-disks) has \
-                         them relaxed first",
+                        "a packing from a file is taken as it stands; leave [disks] out, or have its disks relaxed first with \
+                         relax = true in [disks] (--relax-disks)",
                     ));
                 }
                 Ok(Start::File {

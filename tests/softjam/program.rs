@@ -1,5 +1,6 @@
 //! The program at its process boundary: exit codes, files, messages.
 
+mod cases;
 mod convert;
 #[cfg(unix)]
 mod files;
@@ -278,22 +279,15 @@ fn a_step_limit_that_comes_first_exits_with_3() {
 fn an_interrupted_run_leaves_a_readable_recording() {
     let folder = folder();
     for signal in ["INT", "TERM"] {
+        let name = format!("{signal}.rrd");
         let mut child = Command::new(SOFTJAM)
             .current_dir(folder.path())
-            .args([
-                "record",
-                "-N",
-                "1024",
-                "--threshold",
-                "1e-300",
-                "-o",
-                signal,
-            ])
+            .args(["record", "-N", "1024", "--threshold", "1e-300", "-o", &name])
             .stdout(Stdio::piped())
             .spawn()
             .expect("softjam starts");
         // Wait until the first batch has reached the file.
-        let file = folder.path().join(signal);
+        let file = folder.path().join(&name);
         let start = Instant::now();
         while std::fs::metadata(&file).map_or(0, |m| m.len()) < 2_000_000 {
             assert!(
@@ -308,7 +302,7 @@ fn an_interrupted_run_leaves_a_readable_recording() {
         assert!(kill.expect("kill runs").success());
         let status = child.wait().expect("softjam ends");
         assert_eq!(status.code(), Some(1));
-        let (code, out, errors) = run(folder.path(), &["info", signal]);
+        let (code, out, errors) = run(folder.path(), &["info", &name]);
         assert_eq!(code, Some(3), "{errors}");
         assert!(out.contains("unfinished: the run was interrupted"), "{out}");
     }

@@ -255,7 +255,7 @@ impl Findings {
         match d.origin {
             Origin::Scene => {}
             Origin::Positions => {
-                not.push("whether the start file holds these positions and radii".to_owned());
+                not.push("whether the start file leads to these positions and radii".to_owned());
             }
             Origin::Frame => not.push(format!(
                 "how the run came to step {}, which is in the recording that this one goes on from",

@@ -408,13 +408,15 @@ fn what_is_no_file_is_written_to_straight_away_and_not_read_as_a_recording() {
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         (output.status.code(), errors)
     };
-    let (code, errors) = piped(format!("'{SOFTJAM}' convert -f a.rrd /dev/stdout | cat >b"));
+    let (code, errors) = piped(format!(
+        "'{SOFTJAM}' convert -f a.rrd /dev/stdout | cat >b.rrd"
+    ));
     assert_eq!(code, Some(0), "{errors}");
-    let copy = fs::read(folder.path().join("b")).expect("b");
+    let copy = fs::read(folder.path().join("b.rrd")).expect("b.rrd");
     assert!(copy.starts_with(&fs::read(name).expect("a.rrd")));
-    for reader in ["info", "replay", "convert -f", "record -f -o b --from"] {
+    for reader in ["info", "replay", "convert -f", "record -f -o b.rrd --from"] {
         let output = if reader.starts_with("convert") {
-            "b"
+            "b.rrd"
         } else {
             ""
         };

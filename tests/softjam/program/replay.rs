@@ -179,7 +179,7 @@ fn a_killed_run_is_verified_as_far_as_it_goes_and_can_be_finished() {
     child.kill().expect("killed");
     child.wait().expect("gone");
     let (code, out, errors) = run(folder.path(), &["replay", "killed.rrd"]);
-    assert_eq!(code, Some(1), "{errors}");
+    assert_eq!(code, Some(1), "{out}{errors}");
     assert!(out.contains("verified as far as it goes"), "{out}");
     let (code, _, errors) = run(
         folder.path(),
