@@ -30,8 +30,8 @@ pub struct Packing {
     domain: Domain,
     /// Shared by the copies of a packing, since they never change.
     radii: Arc<[f64]>,
-    /// The smallest and the largest of them, which every step asks for.
-    extremes: [f64; 2],
+    /// The smallest, the largest and the mean of them, which every step asks for.
+    sizes: [f64; 3],
     positions: Vec<Vec2>,
 }
 
@@ -126,10 +126,11 @@ impl Packing {
         }
         let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
         let largest = radii.iter().copied().fold(0.0, f64::max);
+        let mean = radii.iter().sum::<f64>() / radii.len() as f64;
         Ok(Self {
             domain,
             radii: radii.into(),
-            extremes: [smallest, largest],
+            sizes: [smallest, largest, mean],
             positions,
         })
     }
@@ -180,12 +181,19 @@ impl Packing {
     /// ```
     #[must_use]
     pub fn largest_radius(&self) -> f64 {
-        self.extremes[1]
+        self.sizes[1]
     }
 
     /// The smallest undeformed radius.
     pub(crate) fn smallest_radius(&self) -> f64 {
-        self.extremes[0]
+        self.sizes[0]
+    }
+
+    /// The largest radius, or twice the mean where that is less: what the skin of a neighbour list is measured by. By a particle much
+    /// larger than the others it would hold a crowd of pairs for each of them.
+    pub(crate) fn ample_radius(&self) -> f64 {
+        let [_, largest, mean] = self.sizes;
+        largest.min(2.0 * mean)
     }
 
     /// The centres `r_i`, wrapped into the box.

@@ -284,7 +284,7 @@ impl ContactLaw {
 
     /// A neighbour list that covers bulges up to `largest`.
     pub(super) fn cover(&mut self, packing: &Packing, largest: f64) {
-        let skin = 0.3 * packing.largest_radius();
+        let skin = 0.3 * packing.ample_radius();
         let moved = core::mem::replace(&mut self.moved, 0.0);
         if self
             .neighbors

@@ -79,7 +79,7 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
     let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
     let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
     let domain = packing.domain();
-    let radius = packing.largest_radius();
+    let radius = packing.ample_radius();
     let mut skin = SKIN[1] * radius;
     let (mut step, mut moved) = (0, f64::INFINITY);
     loop {
@@ -118,7 +118,8 @@ pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f
 /// 0.57: 4344, 3683, 3553 at φ = 0.86; 9114 and 7051 for the last two at 0.845, 1559 and 1595 at 0.92.
 const DT_MAX: f64 = 0.5;
 
-/// How far the neighbour list reaches beyond the disks at least and at most, in units of the largest radius `R`.
+/// How far the neighbour list reaches beyond the disks at least and at most, in units of the largest radius `R`, or of
+/// [`Packing::ample_radius`] where few are so large.
 ///
 /// A skin `s` lasts `s/2v` steps at `v` a step. A list costs as much as some eight pairs a particle, and holds some 1.2 `s/R`
 /// pairs a particle in vain: both together cost least near `s = √(12 v R)`.

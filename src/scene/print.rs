@@ -37,7 +37,7 @@ impl Scene {
                 quoted("file"),
             );
             page.field(
-                "CSV file of x, y, radius with its box; particles, radii and box come from it.",
+                "CSV file of x, y, radius (or diameter) with its box, \"-\" for standard input; particles, radii and box come from it.",
                 "file",
                 quoted(path),
             );

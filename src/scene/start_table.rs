@@ -63,7 +63,7 @@ pub(super) fn parse(text: &str) -> Result<Table, Complaint> {
         byte: 0,
         line: 1,
     };
-    let mut size = None;
+    let mut begun = false;
     let mut table = Table {
         domain,
         box_line,
@@ -79,23 +79,20 @@ pub(super) fn parse(text: &str) -> Result<Table, Complaint> {
         };
         let before = places.byte;
         let (line, row) = places.row(position);
-        let size = match size {
-            Some(size) => size,
-            None => {
-                let record = record.as_ref().ok();
-                let named = record.and_then(|record| Size::of(record.iter()));
-                let comments = &text[before..places.byte];
-                table.size = *size.insert(header(comments, named, (line, row))?);
-                if named.is_some() {
-                    continue;
-                }
-                table.size
+        if !begun {
+            let first = record.as_ref().ok();
+            let named = first.and_then(|record| Size::of(record.iter()));
+            let comments = &text[before..places.byte];
+            table.size = header(comments, named, (line, row))?;
+            begun = true;
+            if named.is_some() {
+                continue;
             }
-        };
+        }
         let number = |k: usize| record.as_ref().ok()?.get(k)?.parse::<f64>().ok();
         let three = record.as_ref().is_ok_and(|record| record.len() == 3);
         let (true, Some(x), Some(y), Some(width)) = (three, number(0), number(1), number(2)) else {
-            let numbers = format!("three numbers x,y,{}", size.name());
+            let numbers = format!("three numbers x,y,{}", table.size.name());
             let problem = match row {
                 "" => format!("there are not {numbers}"),
                 row => format!("{} is not {numbers}", quote(row)),
@@ -103,12 +100,12 @@ pub(super) fn parse(text: &str) -> Result<Table, Complaint> {
             return Err((line, problem));
         };
         let particle = table.radii.len();
-        let radius = check(particle, Vec2::new(x, y), (size, width));
+        let radius = check(particle, Vec2::new(x, y), (table.size, width));
         table.radii.push(radius.map_err(|problem| (line, problem))?);
         table.positions.push(Vec2::new(x, y));
         table.lines.push(line);
     }
-    if size.is_none() {
+    if !begun {
         let problem = "there is no header `x,y,radius` with a particle below it";
         return Err((0, problem.into()));
     }
@@ -261,6 +258,7 @@ fn find_box(text: &str) -> Result<(u64, Domain), Complaint> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn complaint(rows: &str) -> (u64, String) {
         parse(&format!("# box = 6, 6\nx,y,radius\n{rows}")).unwrap_err()
@@ -317,6 +315,30 @@ mod tests {
         assert_eq!(parse(text).unwrap().lines, [4, 7, 8]);
         let text = "# box = 6, 6\nx,y,radius\n\n1,1,0.5\n2,1,0.5\n# end\n";
         assert_eq!(parse(text).unwrap().lines, [4, 5]);
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_a_file_says_is_a_table_or_a_complaint(
+            pieces in prop::collection::vec(
+                prop::sample::select(vec![
+                    "# box = 6, 6", "#", "x,y,radius", "x,y,d", "1,2,0.5", "\n", "\r", "\r\n", "\"", ",", " ", "é", "1e17",
+                    "nan", "\u{feff}", "-", "\0",
+                ]),
+                0..30,
+            ),
+        ) {
+            let text = pieces.concat();
+            match parse(&text) {
+                Ok(table) => {
+                    let lines = text.matches('\n').count() as u64 + 1;
+                    prop_assert!(table.lines.iter().all(|line| (1..=lines).contains(line)));
+                    prop_assert!(table.lines.is_sorted());
+                    prop_assert_eq!(table.lines.len(), table.radii.len());
+                }
+                Err((_, problem)) => prop_assert!(!problem.is_empty()),
+            }
+        }
     }
 
     #[test]
