@@ -174,19 +174,21 @@ impl CellList {
         let n = packing.len();
         let grid = Grid::new(packing.domain(), longest, n);
         // Fewer than three cells along a side, or cells that hold many: a narrow box, or a few particles much larger than the others.
-        let Some(grid) = grid.filter(|grid| n <= CROWDED * grid.columns * grid.rows) else {
-            if n <= FEW {
-                pairs_of_all(packing, reach, pairs);
-            } else {
-                pairs_by_size(packing, reach, pairs);
+        let grid = grid.filter(|grid| n <= CROWDED * grid.columns * grid.rows);
+        let count = match grid {
+            Some(grid) => {
+                self.fill(packing, grid);
+                wide(
+                    #[inline(always)]
+                    || self.search(packing.domain(), reach, grid),
+                )
             }
-            return;
+            None if n <= FEW => return pairs_of_all(packing, reach, pairs),
+            None => {
+                pairs_by_size(packing, reach, &mut self.found);
+                self.found.len()
+            }
         };
-        self.fill(packing, grid);
-        let count = wide(
-            #[inline(always)]
-            || self.search(packing.domain(), reach, grid),
-        );
         let (found, slots) = (&self.found[..count], &mut self.slots);
         sort_by_number(found, &mut self.by_second, slots, n, |pair| pair[1]);
         sort_by_number(&self.by_second, pairs, slots, n, |pair| pair[0]);
@@ -265,7 +267,7 @@ fn pairs_of_all(packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
     }
 }
 
-/// The same, each particle against those near it that are of its octave of sizes or a larger one.
+/// The same in some order: each particle against those near it that are of its octave of sizes or a larger one.
 fn pairs_by_size(packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
     let (domain, grids) = (packing.domain(), octaves::by_size(packing, reach));
     pairs.clear();
@@ -283,7 +285,6 @@ fn pairs_by_size(packing: &Packing, reach: f64, pairs: &mut Vec<[u32; 2]>) {
             }
         }
     }
-    pairs.sort_unstable();
 }
 
 /// Counting sort of `items` into `sorted` by a number below `numbers`; equal ones keep their order. Those of number c
@@ -427,6 +428,7 @@ mod tests {
             let packing = Packing::new(domain, radii, positions).unwrap();
             let (mut by_size, mut all) = (Vec::new(), Vec::new());
             pairs_by_size(&packing, reach, &mut by_size);
+            by_size.sort_unstable();
             pairs_of_all(&packing, reach, &mut all);
             prop_assert_eq!(&by_size, &all);
             let mut list = NeighborList::new();
