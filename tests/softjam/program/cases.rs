@@ -208,7 +208,7 @@ fn names_that_say_no_format_or_another_are_refused_before_anything_runs() {
     record(folder.path(), "a.rrd", &[]);
     let both = "the name of a recording ends in .rrd (rerun) or .mcap (Foxglove)";
     let mcap = "the name of an MCAP file ends in .mcap; .rrd files are for -o";
-    let figure = "a figure's name ends in .svg or .png";
+    let figure = "a figure's name ends in .svg, .pdf or .png";
     // What would run takes minutes.
     let long = ["-N", "100000", "--threshold", "1e-300"];
     let record_into = |more: &[&'static str]| [&["record"], &long[..], more].concat();
