@@ -251,3 +251,46 @@ fn names_that_say_no_format_or_another_are_refused_before_anything_runs() {
         record(folder.path(), "d.rrd", &["-f", "--mcap", "/dev/null"]);
     }
 }
+
+#[test]
+fn what_stands_by_symmetry_alone_is_called_a_saddle_and_left_on_request() {
+    let folder = folder();
+    for (name, end) in [
+        ("unstable-column", "not jammed: no contact bears a force"),
+        ("unstable-square", "not jammed: no contact bears a force"),
+    ] {
+        let (code, out, errors) = start(folder.path(), name, &[]);
+        assert_eq!(code, Some(0), "{name}: {errors}");
+        assert!(
+            out.contains("converged in 0 steps on a saddle: balanced, but not stable"),
+            "{out}"
+        );
+        let (_, json, _) = run(folder.path(), &["info", "a.rrd", "--json"]);
+        assert!(json.contains("\"stability\": \"saddle\""), "{json}");
+
+        let (code, out, errors) = start(folder.path(), name, &["--minimizer", "fire+newton"]);
+        assert_eq!(code, Some(0), "{name}: {errors}");
+        assert!(out.contains(end), "{name}: {out}");
+        verify(folder.path());
+    }
+}
+
+#[test]
+fn below_jamming_the_result_says_so() {
+    let folder = folder();
+    let (code, out, errors) = run(
+        folder.path(),
+        &["record", "-N", "64", "--phi", "0.7", "-o", "a.rrd"],
+    );
+    assert_eq!(code, Some(0), "{errors}");
+    assert!(
+        out.contains(", not jammed: no contact bears a force"),
+        "{out}"
+    );
+    let (_, info, _) = run(folder.path(), &["info", "a.rrd"]);
+    assert!(
+        info.contains("not jammed: no contact bears a force"),
+        "{info}"
+    );
+    verify(folder.path());
+}
