@@ -123,12 +123,12 @@ fn record(
     let output = command.arg("--output").arg(&file).output()?;
     let bytes = std::fs::metadata(&file)?.len() as f64;
     std::fs::remove_file(&file)?;
-    // `result         converged in 2307 steps` and
+    // `result         converged in 2307 steps to a minimum` and
     // `time           0.02 s disks, 0.53 s relaxation (3942 steps/s)`
     let text = String::from_utf8(output.stdout)?;
     let line = |start: &str| text.lines().find(|line| line.starts_with(start));
     let number = |word: Option<&str>| word?.parse::<f64>().ok();
-    let steps = line("result").and_then(|l| number(l.split(' ').rev().nth(1)));
+    let steps = line("result").and_then(|l| number(l.split(" in ").nth(1)?.split(' ').next()));
     let rate = line("time").and_then(|l| number(l.rsplit_once('(')?.1.split(' ').next()));
     let (steps, rate) = steps
         .zip(rate)

@@ -227,6 +227,9 @@ def must_fail(what, picture, r, check=look):
 def whole_messages(path, folder):
     """The recording up to its last whole message: newer viewers open no file that breaks off within one."""
     data, end = path.read_bytes(), 12
+    # What ends with its footer is whole.
+    if data[-12:-4] == b"RRF2FOOT":
+        return path
     while end + 16 <= len(data):
         length = int.from_bytes(data[end + 8 : end + 16], "little")
         if end + 16 + length > len(data):
