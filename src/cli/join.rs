@@ -15,7 +15,7 @@ Examples:
 
 Parts are named in the order of their first steps, and each begins at a state that one before it holds. They are of one scene, but for
 its step limit, and have the same channels. What two of them hold has to be the same to the last bit; pictures are drawn anew. OUT
-takes its place when it is whole.
+takes its place when it is whole or, where the last part breaks off, as far as it goes.
 
 Exit codes: 0 joined, 1 could not be done, or the last part breaks off (what came before is joined), 2 the request makes no sense, or
 these are not parts of one run")]

@@ -36,8 +36,8 @@ Examples:
   softjam record --particles 1024 --spawn           and look on
   softjam record --file mine.csv -o mine.rrd        a packing of your own, relaxed as it stands
   make-packing | softjam record --file - --relax-disks -o mine.rrd
-                                                    one that overlaps too far for it, through a pipe
-Open a recording with the rerun viewer (pip install rerun-sdk==0.36.3): rerun run.rrd
+                                                    one strewn at random, its disks relaxed first, through a pipe
+Open a recording with the rerun viewer (pip install rerun-sdk): rerun run.rrd
 
 RUN.rrd is written as RUN.rrd.part until it holds its first state, and then takes its place: from then on it can be read, and gone
 on from with --from if the run is killed, which loses a second or less. What a run that was killed before (kill -9) has left as

@@ -13,8 +13,8 @@ use crate::scene::SceneError;
 pub enum Status {
     /// Above the threshold, below the step limit.
     Running,
-    /// `f_max` is not above the threshold and the contact law is fulfilled. Newton's method does not end on a
-    /// [saddle](super::Stability::Saddle); FIRE alone can.
+    /// `f_max` is not above the threshold and the contact law is fulfilled. Newton's method goes on from what
+    /// is told to be a [saddle](super::Stability::Saddle); FIRE alone ends there.
     Converged,
     /// The step limit came first.
     StepLimit,

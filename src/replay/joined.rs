@@ -66,9 +66,14 @@ impl Recording {
             let problem = differs(first, part).or_else(|| {
                 let (begins, earlier) = (part.from_step(), before.from_step());
                 let name = shown(before.path());
-                (begins < earlier).then(|| {
-                    format!("it begins with step {begins}, before {name}, which begins with step {earlier}: name it earlier")
-                })
+                let (limit, longer) = (part.scene().steps, before.scene().steps);
+                if begins < earlier {
+                    Some(format!("it begins with step {begins}, before {name}, which begins with step {earlier}: name it earlier"))
+                } else if begins == earlier && limit < longer {
+                    Some(format!("it ends with step {limit} at the latest, and {name}, which begins where it does, goes on to {longer}: name it earlier"))
+                } else {
+                    None
+                }
             });
             if let Some(problem) = problem {
                 return Err(join(part.path(), problem));
@@ -80,7 +85,11 @@ impl Recording {
         }
         let names: Vec<String> = parts.iter().map(|part| shown(part.path())).collect();
         // A run that came to its step limit may have been given more steps.
-        let (scene, mut header) = (last.scene().clone(), first.source_header());
+        let longest = parts
+            .iter()
+            .max_by_key(|part| part.scene().steps)
+            .unwrap_or(last);
+        let (scene, mut header) = (longest.scene().clone(), first.source_header());
         header.scene = scene.clone();
         header.bits = last.bits();
         let (format, budget) = (first.format(), first.budget());

@@ -142,7 +142,7 @@ pub enum LiveError {
         url: String,
     },
     /// There is no viewer to start.
-    #[error("there is no program `rerun` on the PATH; `pip install rerun-sdk==0.36.3` brings it")]
+    #[error("there is no program `rerun` on the PATH; `pip install rerun-sdk` brings it")]
     Missing,
     /// The viewer, or the thread that would feed it, could not be started.
     #[error("cannot start the live view: {source}")]

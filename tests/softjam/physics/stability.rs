@@ -118,3 +118,70 @@ fn newtons_method_does_not_end_on_a_saddle() {
         }
     }
 }
+
+/// A hexagonal crystal with four vacancies around one particle, which its neighbours left and right hold between them: it is a strut that buckles.
+/// One mode of a few particles among thousands.
+fn strut(columns: usize, rows: usize, a: f64) -> Packing {
+    let height = a * 3f64.sqrt() / 2.0;
+    let (i0, j0) = (columns / 2, rows / 2 / 2 * 2);
+    let place = |i: usize, j: usize| {
+        let shifted = i as f64 + 0.5 * (j % 2) as f64 + 0.25;
+        Vec2::new(shifted * a, (j as f64 + 0.5) * height)
+    };
+    let vacant = |i: usize, j: usize| j.abs_diff(j0) == 1 && (i == i0 || i + 1 == i0);
+    let positions: Vec<Vec2> = (0..rows)
+        .flat_map(|j| (0..columns).map(move |i| (i, j)))
+        .filter(|&(i, j)| !vacant(i, j))
+        .map(|(i, j)| place(i, j))
+        .collect();
+    let domain = Domain::new(columns as f64 * a, rows as f64 * height).unwrap();
+    Packing::new(domain, vec![0.5; positions.len()], positions).unwrap()
+}
+
+/// Relaxed by forces alone the strut stands by symmetry; a nudge shows that it lay higher.
+#[test]
+fn a_buckling_strut_among_thousands_of_particles_is_seen() {
+    for (columns, rows) in [(8, 8), (36, 36), (40, 40)] {
+        for forces in [Form::Central, Form::Gradient] {
+            let scene = Scene {
+                forces,
+                steps: 20_000,
+                ..Scene::default()
+            };
+            let run = |minimizer, packing: &Packing| {
+                let scene = Scene {
+                    minimizer,
+                    ..scene.clone()
+                };
+                let mut run = Relaxation::of_packing(&scene, packing.clone()).unwrap();
+                while run.status() == Status::Running {
+                    run.advance().unwrap();
+                }
+                assert_eq!(run.status(), Status::Converged);
+                run
+            };
+            let run = run(Minimizer::FireNewton, &strut(columns, rows, 0.96));
+            assert_eq!(run.stability(), Some(Stability::Minimum));
+            let end = run.observables().energy;
+            // By hand out of the mirror plane, FIRE to the bottom.
+            let positions = run.packing().positions().iter().enumerate();
+            let nudge = |(k, x): (usize, &Vec2)| x + Vec2::new(0.0, 1e-5 * (k as f64 * 1.7).sin());
+            let nudged = Packing::new(
+                run.packing().domain(),
+                run.packing().radii().to_vec(),
+                positions.map(nudge).collect(),
+            )
+            .unwrap();
+            let mut again = Relaxation::of_packing(&scene, nudged).unwrap();
+            while again.status() == Status::Running {
+                again.advance().unwrap();
+            }
+            let shaken = again.observables().energy;
+            println!("{columns} × {rows}: U = {end:.9}, shaken {shaken:.9}");
+            assert!(
+                (shaken - end).abs() < 1e-6 * end,
+                "{columns} × {rows}, {forces:?}"
+            );
+        }
+    }
+}

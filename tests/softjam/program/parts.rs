@@ -222,6 +222,14 @@ fn what_is_left_of_a_killed_run_and_its_rest_are_joined_to_the_bytes_of_the_whol
     ]);
     good(&["join", "limited.rrd", "more.rrd", "-o", "long.rrd"]);
     assert!(bytes("long.rrd") == bytes("whole.rrd"));
+    let order = ["join", "whole.rrd", "limited.rrd", "-o", "other.rrd"];
+    let (code, _, errors) = run(folder.path(), &order);
+    assert_eq!(code, Some(2), "{errors}");
+    assert!(
+        errors.contains("it ends with step 301 at the latest"),
+        "{errors}"
+    );
+    assert!(!folder.path().join("other.rrd").exists());
 }
 
 #[test]
