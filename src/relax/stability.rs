@@ -106,7 +106,10 @@ const PRESTRESS: f64 = 0.9;
 const ACCURACY: f64 = 1e-2;
 
 /// What is left of a product behind this length is rounding: products of unit vectors are of length 1, about.
-const NOTHING: f64 = 1e-12;
+const NOTHING: f64 = 1e-8;
+
+/// Eigenvalues of this size are 0 but for rounding: pieces of a packing that do not touch each other can be moved apart.
+const ZERO: f64 = 1e-7;
 
 /// A Ritz value counts when its residual is this part of it, or less.
 const DECIDED: f64 = 0.5;
@@ -177,6 +180,12 @@ fn lowest(packing: &Packing, law: &ContactLaw, form: Form) -> Option<Judgement> 
     let mut h = DMatrix::zeros(MOST + 1, MOST);
     // Looks in a row at which a positive Ritz value had decided.
     let mut positive = 0;
+    // Displacements of the particles that have contacts, but for the two translations: there are no more directions.
+    let mut touched = vec![false; packing.len()];
+    for &[i, j] in contacts.pairs {
+        (touched[i as usize], touched[j as usize]) = (true, true);
+    }
+    let whole = (2 * touched.iter().filter(|t| **t).count()).saturating_sub(2);
     for k in 0..MOST {
         let mut next = Displacement::default();
         next.force.resize(2 * packing.len(), 0.0);
@@ -192,7 +201,11 @@ fn lowest(packing: &Packing, law: &ContactLaw, form: Form) -> Option<Judgement> 
             next.subtract(h[(row, k)], v);
         }
         let size = k + 1;
-        let length = next.normalize(NOTHING);
+        let length = if size < whole {
+            next.normalize(NOTHING)
+        } else {
+            0.0
+        };
         h[(size, k)] = length;
         if size % PERIOD == 0 || length == 0.0 {
             let (theta, vector) = lowest_ritz(&h.view((0, 0), (size, size)).into_owned());
@@ -222,11 +235,12 @@ fn lowest(packing: &Packing, law: &ContactLaw, form: Form) -> Option<Judgement> 
     None
 }
 
-/// The lowest real part of an eigenvalue of `h`, and a vector of unit length that belongs to it.
+/// The lowest real part of an eigenvalue of `h` that is not 0, and a vector of unit length that belongs to it.
 fn lowest_ritz(h: &DMatrix<f64>) -> (f64, DVector<f64>) {
     let n = h.nrows();
     let values = h.complex_eigenvalues();
-    let theta = values.iter().fold(f64::INFINITY, |m, z| m.min(z.re));
+    let parts = values.iter().map(|z| z.re).filter(|re| re.abs() > ZERO);
+    let theta = parts.fold(f64::INFINITY, f64::min);
     // Inverse iteration, from as near as leaves the matrix regular.
     let shift = theta - 1e-10 * values.iter().fold(0.0, |m: f64, z| m.max(z.re.abs()));
     let factors = (h - DMatrix::identity(n, n) * shift).lu();
