@@ -45,12 +45,6 @@ pub fn largest_frequency(
     let contacts = law.contacts();
     let (pairs, normals) = (contacts.pairs.to_vec(), contacts.normals.to_vec());
     let distances = contacts.distances.to_vec();
-    // A fixed vector with a part of every mode: multiples of the golden ratio, folded into ±1/2.
-    let golden = 0.618_033_988_749_894_9;
-    let folded = |k: usize| {
-        let x = golden * k as f64;
-        x - libm::floor(x) - 0.5
-    };
     let mut u: Vec<Vec2> = (0..packing.len())
         .map(|p| Vec2::new(folded(2 * p + 1), folded(2 * p + 2)))
         .collect();
@@ -89,4 +83,10 @@ pub fn largest_frequency(
         core::mem::swap(&mut u, &mut image);
     }
     Ok(largest.max(floor).sqrt())
+}
+
+/// Entry `k` of a fixed vector with a part of every mode: multiples of the golden ratio, folded into ±1/2.
+pub(super) fn folded(k: usize) -> f64 {
+    let x = 0.618_033_988_749_894_9 * k as f64;
+    x - libm::floor(x) - 0.5
 }

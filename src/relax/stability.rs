@@ -17,6 +17,7 @@
 //! particle without contacts then has nothing to say. A particle that two contacts of some force hold between them is no
 //! rattler but a saddle.
 
+use super::frequency::folded;
 use super::newton::{Linear, Stiffness, dot};
 use crate::contact::ContactLaw;
 use crate::domain::Vec2;
@@ -267,11 +268,6 @@ impl Displacement {
         let mut first = Self {
             shift: Vec::new(),
             force: vec![0.0; 2 * particles],
-        };
-        // Multiples of the golden ratio, folded into ±1/2.
-        let folded = |k: usize| {
-            let x = 0.618_033_988_749_894_9 * k as f64;
-            x - libm::floor(x) - 0.5
         };
         for (c, &[i, j]) in pairs.iter().enumerate() {
             for axis in 0..2 {

@@ -8,12 +8,16 @@ use softjam::packing::Packing;
 use softjam::relax::{Relaxation, Stability, Status};
 use softjam::scene::{Minimizer, Scene};
 
-/// Runs to balance and asserts that what the run says of it is what the eigenvalues say.
-fn judged(scene: &Scene) -> Stability {
-    let mut run = Relaxation::new(scene).unwrap();
+fn to_its_end(run: &mut Relaxation) {
     while run.status() == Status::Running {
         run.advance().unwrap();
     }
+}
+
+/// Runs to balance and asserts that what the run says of it is what the eigenvalues say.
+fn judged(scene: &Scene) -> Stability {
+    let mut run = Relaxation::new(scene).unwrap();
+    to_its_end(&mut run);
     assert_judged_right(&run, scene)
 }
 
@@ -106,9 +110,7 @@ fn newtons_method_does_not_end_on_a_saddle() {
             let saddle = run.observables().energy;
             assert_eq!(run.stability(), Some(Stability::Saddle));
             assert_eq!(run.status(), Status::Running);
-            while run.status() == Status::Running {
-                run.advance().unwrap();
-            }
+            to_its_end(&mut run);
             assert_eq!(run.status(), Status::Converged);
             let stability = assert_judged_right(&run, &scene);
             assert_ne!(stability, Stability::Saddle);
@@ -154,9 +156,7 @@ fn a_buckling_strut_among_thousands_of_particles_is_seen() {
                     ..scene.clone()
                 };
                 let mut run = Relaxation::of_packing(&scene, packing.clone()).unwrap();
-                while run.status() == Status::Running {
-                    run.advance().unwrap();
-                }
+                to_its_end(&mut run);
                 assert_eq!(run.status(), Status::Converged);
                 run
             };
@@ -173,9 +173,7 @@ fn a_buckling_strut_among_thousands_of_particles_is_seen() {
             )
             .unwrap();
             let mut again = Relaxation::of_packing(&scene, nudged).unwrap();
-            while again.status() == Status::Running {
-                again.advance().unwrap();
-            }
+            to_its_end(&mut again);
             let shaken = again.observables().energy;
             println!("{columns} × {rows}: U = {end:.9}, shaken {shaken:.9}");
             assert!(
