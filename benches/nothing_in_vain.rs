@@ -11,15 +11,16 @@
     reason = "a program that prints what it measured"
 )]
 
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Rule};
-use softjam::disks::{self, DiskParameters};
-use softjam::droplet::contour::{ContourStyle, Contours};
-use softjam::force::Backbone;
+use softjam::analysis::Backbone;
+use softjam::models::disks;
+use softjam::models::disks::DiskParameters;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::models::droplet::contour::{ContourStyle, Contours};
 use softjam::neighbors::NeighborList;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
+use softjam::state::Packing;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::hint::black_box;

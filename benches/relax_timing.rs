@@ -12,10 +12,11 @@
     reason = "its line of JSON is what the program is for"
 )]
 
-use softjam::disks;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Stability, Status};
+use softjam::analysis::Stability;
+use softjam::models::disks;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
+use softjam::state::Packing;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

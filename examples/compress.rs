@@ -8,11 +8,11 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::domain::Domain;
-use softjam::droplet::contour::{ContourStyle, Contours};
-use softjam::force::Form;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::Form;
+use softjam::models::droplet::contour::{ContourStyle, Contours};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
+use softjam::state::Packing;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;

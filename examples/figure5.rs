@@ -4,7 +4,7 @@
 //! they touch; the particles of (b) give way to each other.
 
 use softjam::figure::{ColorBy, Shape, Style, packing, write};
-use softjam::relax::{Relaxation, Status};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::Scene;
 use std::error::Error;
 use std::path::PathBuf;

@@ -6,7 +6,7 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::figure::{Fall, relaxation, write};
-use softjam::relax::{Relaxation, Status};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::Scene;
 use std::error::Error;
 use std::fmt::Write as _;

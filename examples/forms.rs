@@ -8,8 +8,8 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::domain::Vec2;
-use softjam::force::Form;
-use softjam::relax::{RelaxError, Relaxation, Status};
+use softjam::models::droplet::Form;
+use softjam::protocol::{RelaxError, Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
 use std::error::Error;
 

@@ -7,7 +7,7 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::figure::{Axis, Curve, Mark, Scale, chart, write};
-use softjam::relax::{Relaxation, Status};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::Scene;
 use std::error::Error;
 use std::path::PathBuf;

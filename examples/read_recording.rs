@@ -7,8 +7,8 @@
 //! `FORCES.svg` is a picture of that distribution (`-` for none). With a third file name it writes every number that it reads there as little-endian bytes, in the order of
 //! `examples/python/plot.py`, so that readers in other languages can be compared with this one.
 
+use softjam::analysis::METRICS;
 use softjam::figure::{Axis, Curve, Mark, Scale, chart, write};
-use softjam::force::METRICS;
 use softjam::replay::{Event, Recording};
 use std::collections::BTreeMap;
 use std::error::Error;

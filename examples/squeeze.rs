@@ -10,7 +10,7 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::figure::{Axis, Curve, Mark, Scale, chart, write};
-use softjam::relax::Relaxation;
+use softjam::protocol::Relaxation;
 use softjam::scene::{Radii, Scene, Species, Start};
 use std::error::Error;
 use std::f64::consts::PI;

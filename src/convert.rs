@@ -5,7 +5,7 @@
 //! run is walked again from the recorded frame before, and has to arrive at the recorded frame behind.
 //!
 //! ```
-//! use softjam::{convert, record, relax::Relaxation, replay::Recording, scene::{Channels, Scene}};
+//! use softjam::{convert, record, protocol::Relaxation, replay::Recording, scene::{Channels, Scene}};
 //!
 //! let folder = std::env::temp_dir();
 //! let path = |name: &str| folder.join(format!("softjam-convert-example-{name}"));
@@ -24,14 +24,14 @@
 //! # for name in ["a.rrd", "b.mcap", "c.rrd"] { std::fs::remove_file(path(name)).unwrap(); }
 //! ```
 
-use crate::force::{METRICS, Metrics};
-use crate::frame::Frame;
+use crate::analysis::{METRICS, Metrics};
+use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{
     Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
 };
-use crate::relax::{RelaxError, Relaxation, Status};
 use crate::replay::{Event, ReadError, Recording};
 use crate::scene::{Channels, SceneError, Schedule};
+use crate::state::Frame;
 use crate::text::counted;
 use crate::text::shown;
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@
 //! K. Saitoh, *Jamming of soft particles* (2025); equation numbers in the docs are of that paper.
 //!
 //! ```
-//! use softjam::{relax::{Relaxation, Status}, scene::Scene};
+//! use softjam::{protocol::{Relaxation, Status}, scene::Scene};
 //!
 //! let scene = Scene { particles: 64, phi: 0.9, seed: 7, ..Scene::default() };
 //! let mut run = Relaxation::new(&scene)?;
@@ -15,7 +15,7 @@
 //! let o = run.observables();
 //! println!("Z = {:.3}, p = {:.4} γ/length after {} steps", o.coordination(), o.pressure(), run.step());
 //! assert!(o.f_max <= scene.threshold);
-//! # Ok::<(), softjam::relax::RelaxError>(())
+//! # Ok::<(), softjam::protocol::RelaxError>(())
 //! ```
 //!
 //! # The model
@@ -36,13 +36,13 @@
 //! | --- | --- |
 //! | [`model`] | the physics, formula by formula: nothing but text |
 //! | [`scene`] | what a run depends on: TOML, defaults, ranges, first packings |
-//! | [`domain`], [`packing`], [`neighbors`] | periodic box, positions and radii, candidate pairs |
-//! | [`disks`] | the undeformed packing that a run starts from |
-//! | [`droplet`] | one particle: kernel and contour |
-//! | [`contact`] | contact lists, the matrix `A`, the complementarity problem, its solvers |
-//! | [`force`] | net forces, energy, stress, coordination |
-//! | [`relax`] | FIRE and the loop that yields frames |
-//! | [`frame`] | a frame and its digest |
+//! | [`domain`], [`state`], [`neighbors`] | periodic box; packings and frames; candidate pairs |
+//! | [`contacts`] | what every model tells about its contacts |
+//! | [`models`] | [disks](models::disks); [droplets](models::droplet): kernel, contour, the matrix `A`, the complementarity problem |
+//! | [`minimize`] | FIRE, Newton's method |
+//! | [`analysis`] | energy, stress, coordination, rattlers, minimum or saddle |
+//! | [`protocol`] | the relaxation: the loop that yields frames |
+//! | [`numerics`] | a second thread for one run |
 //! | [`text`], [`budget`] | text from strangers; how much memory their files may take |
 #![cfg_attr(
     feature = "recording",
@@ -58,33 +58,28 @@
 //! The same scene gives the same bits, on any x86-64 CPU: every transcendental function comes from the crate `libm`,
 //! sums have one order, random numbers come from a named generator. A frame determines the next one.
 
+pub mod analysis;
 pub mod budget;
-pub mod contact;
+pub mod contacts;
 #[cfg(feature = "recording")]
 pub mod convert;
-mod crowding;
-pub mod disks;
 pub mod domain;
-pub mod droplet;
 #[cfg(feature = "figure")]
 pub mod figure;
-pub mod force;
-pub mod frame;
+pub mod minimize;
 #[doc = include_str!("model.md")]
 pub mod model {}
+pub mod models;
 pub mod neighbors;
-mod octaves;
-pub mod packing;
+pub mod numerics;
+pub mod protocol;
 #[cfg(feature = "recording")]
 pub mod record;
-pub mod relax;
 #[cfg(feature = "recording")]
 pub mod replay;
 pub mod scene;
-mod simplicial;
+pub mod state;
 pub mod text;
-pub mod threads;
-mod wide;
 
 /// The revision of the bits: a number that is raised whenever a change of the program alters a bit of any state. A scene gives
 /// the same bits with every version of one revision; of another revision a replay expects the same physics, not the same bits.

@@ -5,11 +5,11 @@
 //! before, *cold* from zero forces on the right contacts. Sparse Cholesky keeps its symbolic part while the contacts stay.
 
 use super::table::{Table, digits, median};
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Rule};
-use softjam::packing::Packing;
-use softjam::relax::Relaxation;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::protocol::Relaxation;
 use softjam::scene::Scene;
+use softjam::state::Packing;
 use std::error::Error;
 use std::time::Instant;
 

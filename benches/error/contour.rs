@@ -4,9 +4,9 @@
 //! between every two vertices and at all contacts, against ρ(θ) from its formula; in units of the particle's radius.
 
 use super::table::{Table, digits};
-use softjam::droplet::contour::{ContourStyle, Contours, Placement};
-use softjam::droplet::kernel::g;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::contour::{ContourStyle, Contours, Placement};
+use softjam::models::droplet::kernel::g;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::Scene;
 use std::error::Error;
 use std::f64::consts::PI;

@@ -5,9 +5,9 @@
 //! own, so that their *numerical* error against the model's closed form shows beside the model's.
 
 use super::table::{Table, digits};
-use softjam::droplet::kernel::g;
-use softjam::droplet::validity::Validity;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::kernel::g;
+use softjam::models::droplet::validity::Validity;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Species, Start};
 use std::error::Error;
 use std::f64::consts::PI;
@@ -138,7 +138,9 @@ fn packing(table: &mut Table, phi: f64, particles: usize) -> Result<(), Box<dyn 
         digits(validity.mean),
         String::new(),
         String::new(),
-        digits(softjam::droplet::validity::model_error(validity.mean)),
+        digits(softjam::models::droplet::validity::model_error(
+            validity.mean,
+        )),
         String::new(),
     ]);
     Ok(())

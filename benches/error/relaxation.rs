@@ -3,8 +3,8 @@
 //! Scenes are lines of a scene file; one that this version does not know is left out and said so.
 
 use super::table::{Table, digits, median};
-use softjam::disks;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::disks;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
 use std::error::Error;
 use std::time::Instant;

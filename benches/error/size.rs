@@ -6,10 +6,10 @@
 //! comes one with two threads, which a packing of fewer than some 7000 particles does not use.
 
 use super::table::{Table, digits, median};
-use softjam::disks;
-use softjam::relax::{RelaxError, Relaxation};
+use softjam::models::disks;
+use softjam::numerics::threads;
+use softjam::protocol::{RelaxError, Relaxation};
 use softjam::scene::{Scene, start};
-use softjam::threads;
 use std::error::Error;
 use std::time::Instant;
 

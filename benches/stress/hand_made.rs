@@ -3,11 +3,12 @@
 use super::families::{Case, common};
 use super::outcome::of_packing;
 use super::random::Random;
-use softjam::contact::ContactLaw;
-use softjam::disks::{self, DiskParameters};
 use softjam::domain::{Domain, Vec2};
-use softjam::packing::Packing;
+use softjam::models::disks;
+use softjam::models::disks::DiskParameters;
+use softjam::models::droplet::contact::ContactLaw;
 use softjam::scene::{Radii, Scene, Species, Start};
+use softjam::state::Packing;
 use std::f64::consts::PI;
 
 fn case(name: String, packing: Packing) -> Case {

@@ -2,12 +2,13 @@
 
 use super::stiffness::Spectrum;
 use super::verify::{Answer, Check};
-use softjam::contact::ContactError;
-use softjam::contact::solver::SolverError;
-use softjam::disks;
-use softjam::packing::Packing;
-use softjam::relax::{RelaxError, Relaxation, Stability, Status};
+use softjam::analysis::Stability;
+use softjam::models::disks;
+use softjam::models::droplet::contact::ContactError;
+use softjam::models::droplet::contact::solver::SolverError;
+use softjam::protocol::{RelaxError, Relaxation, Status};
 use softjam::scene::{Scene, SceneError, start};
+use softjam::state::Packing;
 use std::f64::consts::PI;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -94,7 +95,7 @@ fn run(scene: &Scene, packing: Packing) -> Outcome {
     }
 }
 
-fn check(scene: &Scene, packing: &Packing, contacts: softjam::contact::Contacts<'_>) -> Check {
+fn check(scene: &Scene, packing: &Packing, contacts: softjam::contacts::Contacts<'_>) -> Check {
     let centres: Vec<[f64; 2]> = packing.positions().iter().map(|p| [p.x, p.y]).collect();
     let l = packing.domain().lengths();
     Answer {

@@ -2,7 +2,7 @@
 
 use super::families::Family;
 use super::outcome::Outcome;
-use softjam::relax::Stability;
+use softjam::analysis::Stability;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -57,7 +57,8 @@ impl Row {
                 self.law = self.law.max(c.law / c.overlap);
             }
             self.squeeze = self.squeeze.max(c.squeeze);
-            self.strained += usize::from(c.squeeze > softjam::droplet::validity::SQUEEZE_LIMIT);
+            self.strained +=
+                usize::from(c.squeeze > softjam::models::droplet::validity::SQUEEZE_LIMIT);
         }
         if let Some(wrong) = outcome.wrong {
             self.wrong.push(format!("{name}: {wrong}"));
@@ -173,7 +174,7 @@ pub fn markdown(rows: &[Row], lines: &str) -> String {
                 r.strained,
                 r.cases,
                 r.squeeze,
-                100.0 * softjam::droplet::validity::model_error(r.squeeze)
+                100.0 * softjam::models::droplet::validity::model_error(r.squeeze)
             );
         }
         for (reason, (count, first)) in &r.reasons {

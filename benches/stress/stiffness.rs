@@ -14,8 +14,10 @@
 
 use super::verify::{Answer, g, slope};
 use faer::{Mat, Side};
-use softjam::force::{Form, held};
-use softjam::relax::{Relaxation, Stability};
+use softjam::analysis::Stability;
+use softjam::analysis::held;
+use softjam::models::droplet::Form;
+use softjam::protocol::Relaxation;
 use std::f64::consts::PI;
 
 /// What the eigenvalues of `K` say.

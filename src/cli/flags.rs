@@ -65,8 +65,8 @@ pub struct SceneFlags {
     minimizer: Option<softjam::scene::Minimizer>,
 
     /// Forces: central (along the lines of centres) or gradient (of the stored energy) [default: central].
-    #[arg(long, value_name = "FORM", value_parser = named::<softjam::force::Form>, help_heading = RELAXATION)]
-    forces: Option<softjam::force::Form>,
+    #[arg(long, value_name = "FORM", value_parser = named::<softjam::models::droplet::Form>, help_heading = RELAXATION)]
+    forces: Option<softjam::models::droplet::Form>,
 
     /// Upper bound of the time step, in √(mass·length/γ) with mass 1 [default: 1.2/ω_max, from the largest frequency of the
     /// start].
@@ -75,12 +75,12 @@ pub struct SceneFlags {
 
     /// How the contact list follows the positions: complementarity (solved for in every step) or saitoh (one drop-and-add a
     /// step, as in the paper) [default: complementarity].
-    #[arg(long, value_name = "RULE", value_parser = named::<softjam::contact::Rule>, help_heading = RELAXATION)]
-    contact_rule: Option<softjam::contact::Rule>,
+    #[arg(long, value_name = "RULE", value_parser = named::<softjam::models::droplet::contact::Rule>, help_heading = RELAXATION)]
+    contact_rule: Option<softjam::models::droplet::contact::Rule>,
 
     /// How A f = δ is solved: conjugate-gradient, sparse-cholesky or gauss-jordan [default: conjugate-gradient].
-    #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::contact::solver::Method>, help_heading = RELAXATION)]
-    contact_solver: Option<softjam::contact::solver::Method>,
+    #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::models::droplet::contact::solver::Method>, help_heading = RELAXATION)]
+    contact_solver: Option<softjam::models::droplet::contact::solver::Method>,
 
     #[command(flatten)]
     channels: ChannelFlags,

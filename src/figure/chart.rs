@@ -88,7 +88,7 @@ const CHARACTER: f64 = 0.58;
 /// let axis = |title: &str, scale| Axis { title: title.to_owned(), scale };
 /// let kernel = Curve {
 ///     label: "g".to_owned(),
-///     points: (0..=314).map(|k| f64::from(k) / 100.0).map(|t| (t, softjam::droplet::kernel::g(t))).collect(),
+///     points: (0..=314).map(|k| f64::from(k) / 100.0).map(|t| (t, softjam::models::droplet::kernel::g(t))).collect(),
 ///     ..Curve::default()
 /// };
 /// let svg = chart(&axis("θ (radians)", Scale::Linear), &axis("g(θ)", Scale::Linear), &[kernel]).unwrap();

@@ -4,7 +4,7 @@
 //! that a picture is the same on every machine. A length of 96 in the SVG is an inch on paper.
 //!
 //! ```
-//! use softjam::{figure::{Style, packing}, relax::Relaxation, scene::Scene};
+//! use softjam::{figure::{Style, packing}, protocol::Relaxation, scene::Scene};
 //!
 //! let scene = Scene { particles: 32, phi: 0.95, ..Scene::default() };
 //! let run = Relaxation::new(&scene).unwrap();

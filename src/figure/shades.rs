@@ -2,10 +2,10 @@
 
 use super::ColorBy;
 use super::legend::{Legend, length};
-use crate::contact::Contacts;
-use crate::droplet::contour::Contours;
-use crate::force::held;
-use crate::frame::Frame;
+use crate::analysis::held;
+use crate::contacts::Contacts;
+use crate::models::droplet::contour::Contours;
+use crate::state::Frame;
 use core::f64::consts::PI;
 use svg::Node as _;
 use svg::node::element::{Group, Line, Rectangle};

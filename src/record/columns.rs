@@ -3,10 +3,10 @@
 use super::cells::Number as _;
 use super::memory::Values;
 use super::pictures::{Network, Rgb};
-use crate::contact::Contacts;
+use crate::contacts::Contacts;
 use crate::domain::Vec2;
-use crate::droplet::contour::{Contours, Extent};
-use crate::frame::Frame;
+use crate::models::droplet::contour::{Contours, Extent};
+use crate::state::Frame;
 use rerun::external::arrow::array::{Array, ArrayRef, FixedSizeListArray, ListArray};
 use rerun::external::arrow::buffer::{OffsetBuffer, ScalarBuffer};
 use rerun::external::arrow::datatypes::{DataType, Field};

@@ -3,7 +3,7 @@
 use super::columns::array;
 use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, legend, legs_to_text};
-use crate::droplet::validity::SQUEEZE_LIMIT;
+use crate::models::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
 use crate::text::{counted, length, shown};
 use rerun::external::arrow::array::{Float64Array, StringArray, UInt32Array, UInt64Array};

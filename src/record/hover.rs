@@ -7,7 +7,7 @@
 use super::cells::{Cells, Texts, own};
 use super::columns::{Column, rgba};
 use super::pictures::{Particles, Rgb, dimmed};
-use crate::contact::Contacts;
+use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use rerun::{Ellipses2D, Points2D};
 use std::io;

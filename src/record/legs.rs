@@ -1,6 +1,6 @@
 //! What a run went by before its scene was changed on the way.
 
-use crate::force::Form;
+use crate::models::droplet::Form;
 use crate::scene::{Minimizer, Scene};
 
 /// A stretch of a run up to a step at which it was taken up with another threshold, minimiser or form of the forces.

@@ -25,10 +25,10 @@ use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
 use super::{FORMAT_VERSION, Header, Outcome, Recorder, Snapshot, Written, legs_to_text};
-use crate::contact::FrameContacts;
-use crate::droplet::contour::Contours;
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::contacts::FrameContacts;
+use crate::models::droplet::contour::Contours;
+use crate::state::Frame;
+use crate::state::Packing;
 use foxglove::Encode;
 use foxglove::messages::{PointCloud, SceneUpdate};
 use mcap::records::{MessageHeader, Metadata};
@@ -56,7 +56,7 @@ const ZSTD_LEVEL: u32 = 1;
 /// # Example
 ///
 /// ```
-/// use softjam::{record::{Header, McapRecorder, Recorder as _, Snapshot}, relax::Relaxation, scene::Scene};
+/// use softjam::{record::{Header, McapRecorder, Recorder as _, Snapshot}, protocol::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let run = Relaxation::new(&scene).unwrap();

@@ -1,8 +1,8 @@
 //! The messages of `proto/softjam/v1/recording.proto`, and the topics they come under.
 
+use crate::analysis::Metrics;
 use crate::domain::{Domain, Vec2};
-use crate::force::Metrics;
-use crate::frame::Frame;
+use crate::state::Frame;
 
 /// The schemas of the messages below: a `FileDescriptorSet`, made by `proto/regenerate`.
 pub(crate) const DESCRIPTORS: &[u8] = include_bytes!("../../proto/softjam.v1.bin");
@@ -82,7 +82,7 @@ impl MetricsMessage {
         }
     }
 
-    /// The values in the order of [`METRICS`](crate::force::METRICS).
+    /// The values in the order of [`METRICS`](crate::analysis::METRICS).
     pub fn values(&self) -> [Option<f64>; 9] {
         [
             self.f_max,

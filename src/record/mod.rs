@@ -7,7 +7,7 @@
 //! is a [`NewFile`], which takes its place with the first snapshot: a file under its own name holds a state.
 //!
 //! ```
-//! use softjam::{record, relax::Relaxation, scene::Scene};
+//! use softjam::{record, protocol::Relaxation, scene::Scene};
 //!
 //! let path = std::env::temp_dir().join("softjam-record-example.rrd");
 //! let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
@@ -56,9 +56,10 @@ pub use writer::{Writer, Written};
 pub(crate) use legs::{from_text as legs_from_text, to_text as legs_to_text};
 pub(crate) use snapshot::{Snapshots, nanoseconds};
 
-use crate::packing::Packing;
-use crate::relax::{RelaxError, Relaxation, Stability, Status};
+use crate::analysis::Stability;
+use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::scene::{Channels, Scene};
+use crate::state::Packing;
 use crate::text::{counted, shown};
 use std::io;
 use std::path::Path;
@@ -102,7 +103,7 @@ pub(crate) fn id_of(digest: [u8; 32], legs: Option<&str>) -> String {
 /// What a recording says of itself before its first frame.
 ///
 /// ```
-/// use softjam::{record::Header, relax::Relaxation, scene::Scene};
+/// use softjam::{record::Header, protocol::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let run = Relaxation::new(&scene).unwrap();
@@ -145,7 +146,7 @@ impl Header {
 ///
 /// ```
 /// use softjam::record::{Header, McapRecorder, Recorder, RrdRecorder, Snapshot};
-/// use softjam::{relax::Relaxation, scene::Scene};
+/// use softjam::{protocol::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let run = Relaxation::new(&scene).unwrap();
@@ -270,7 +271,7 @@ fn is_special(path: &Path) -> bool {
 /// How a run ended, as it is recorded.
 ///
 /// ```
-/// use softjam::{record::Outcome, relax::Stability};
+/// use softjam::{record::Outcome, analysis::Stability};
 /// let stability = Some(Stability::Minimum);
 /// let outcome = Outcome { converged: true, steps: 9, f_max: 1e-11, stability };
 /// assert_eq!(outcome.to_string(), "converged in 9 steps to a minimum");
@@ -291,7 +292,7 @@ impl Outcome {
     /// How `run` has ended; `None` if it goes on.
     ///
     /// ```
-    /// # use softjam::{record::Outcome, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record::Outcome, protocol::Relaxation, scene::Scene};
     /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
     /// assert_eq!(Outcome::of(&run), None);
     /// ```

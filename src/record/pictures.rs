@@ -1,9 +1,9 @@
 //! What the eye gets, whatever the file: colours of the contours, the force network.
 
-use crate::contact::Contacts;
+use crate::analysis::Backbone;
+use crate::contacts::Contacts;
 use crate::domain::Vec2;
-use crate::force::Backbone;
-use crate::frame::Frame;
+use crate::state::Frame;
 use core::f64::consts::PI;
 use std::sync::LazyLock;
 

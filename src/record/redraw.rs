@@ -7,10 +7,10 @@
 
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
+use crate::analysis::{Backbone, sum_of_forces};
 use crate::domain::{Domain, Vec2, nearest};
-use crate::force::{Backbone, sum_of_forces};
-use crate::frame::Frame;
-use crate::wide::wide;
+use crate::numerics::wide::wide;
+use crate::state::Frame;
 
 /// How much more a pressure or a force may change, in means, than a particle may move, in mean radii: at the default of 0.01
 /// this is less than four hundredths of a colour map, and moves the edge of a line by half a hundredth of a radius.

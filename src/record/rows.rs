@@ -8,11 +8,11 @@ use super::pictures::{Network, Particles};
 use super::redraw::Redraw;
 use super::states::StateRows;
 use super::{Header, Snapshot};
-use crate::contact::{Contacts, FrameContacts};
-use crate::droplet::contour::Contours;
-use crate::force::Metrics;
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::analysis::Metrics;
+use crate::contacts::{Contacts, FrameContacts};
+use crate::models::droplet::contour::Contours;
+use crate::state::Frame;
+use crate::state::Packing;
 
 /// A batch is written when it holds this many bytes (twice as many if they are but a few snapshots, for each chunk costs time whatever
 /// it holds) or snapshots, when it has come to span so many steps, or when the steps up to the next snapshot come to so many moves of

@@ -28,7 +28,7 @@ use super::hover::{ContactRows, ParticleRows};
 use super::images::ImageRows;
 use super::rows::{Batch, MetricRow, Rows};
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, id_of, legs_to_text};
-use crate::force::METRICS;
+use crate::analysis::METRICS;
 use rerun::external::arrow::array::{
     BooleanArray, Float64Array, StringArray, UInt8Array, UInt64Array,
 };
@@ -45,7 +45,7 @@ use std::io::{self, Write};
 /// Two runs of one scene give the same bytes:
 ///
 /// ```
-/// use softjam::{record::{Header, Recorder as _, RrdRecorder, Snapshot}, relax::Relaxation, scene::Scene};
+/// use softjam::{record::{Header, Recorder as _, RrdRecorder, Snapshot}, protocol::Relaxation, scene::Scene};
 ///
 /// let scene = Scene { particles: 32, ..Scene::default() };
 /// let record = || {

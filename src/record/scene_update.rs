@@ -3,7 +3,7 @@
 use super::messages::STEP_NANOSECONDS;
 use super::pictures::{MOST, Network, Rgb};
 use crate::domain::Vec2;
-use crate::droplet::contour::Contours;
+use crate::models::droplet::contour::Contours;
 use foxglove::messages::line_primitive::Type;
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{

@@ -1,16 +1,16 @@
 //! What is recorded of a step, and how snapshots are taken of a run.
 
-use crate::force::{Backbone, Metrics};
-use crate::frame::Frame;
-use crate::relax::Relaxation;
+use crate::analysis::{Backbone, Metrics};
+use crate::protocol::Relaxation;
 use crate::scene::Channels;
+use crate::state::Frame;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// What is recorded of one step.
 ///
 /// ```
-/// use softjam::{record::Snapshot, relax::Relaxation, scene::{Channels, Scene, Schedule}};
+/// use softjam::{record::Snapshot, protocol::Relaxation, scene::{Channels, Scene, Schedule}};
 ///
 /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
 /// let channels = Channels { contours: Schedule::Off, contacts: Schedule::Off, state: Schedule::Off, ..Channels::default() };

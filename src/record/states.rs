@@ -3,7 +3,7 @@
 use super::cells::{Cells, own};
 use super::columns::Column;
 use crate::domain::Vec2;
-use crate::frame::Frame;
+use crate::state::Frame;
 use std::io;
 
 /// `softjam.State` rows in the making.

@@ -3,7 +3,7 @@
 use super::patience::Patience;
 use super::pipeline::Pipeline;
 use super::{Format, Header, McapRecorder, NewFile, Outcome, RecordError, Recorder, Snapshot};
-use crate::frame::Frame;
+use crate::state::Frame;
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -99,7 +99,7 @@ impl Writer {
     /// Those of [`NewFile::create`], and [`RecordError::Name`] where the name says no format.
     ///
     /// ```
-    /// use softjam::{record::{Header, Writer}, relax::Relaxation, scene::Scene};
+    /// use softjam::{record::{Header, Writer}, protocol::Relaxation, scene::Scene};
     ///
     /// let scene = Scene { particles: 32, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();
@@ -138,7 +138,7 @@ impl Writer {
     /// [`RecordError::Create`] if the system has no threads left.
     ///
     /// ```
-    /// use softjam::{record::{Format, Header, NewFile, Writer}, relax::Relaxation, scene::Scene};
+    /// use softjam::{record::{Format, Header, NewFile, Writer}, protocol::Relaxation, scene::Scene};
     ///
     /// let path = std::env::temp_dir().join("softjam-writer-start-example.rrd");
     /// // Whoever cannot have the file hears of it before the disks relax.

@@ -4,21 +4,24 @@
 //! and what comes out is compared with what was recorded. That the forces solve `A f = δ` and that no other pair overlaps
 //! is checked by sums of its own over a freshly assembled `A`, not by the solver's word.
 
-use crate::contact::list::ContactList;
-use crate::contact::matrix::{ContactMatrix, Geometry};
-use crate::contact::solver::Method;
-use crate::contact::{ACCEPTED, ContactError, ContactLaw, FrameContacts, Rule, due_tolerance};
+use crate::analysis::Observables;
+use crate::contacts::FrameContacts;
+use crate::contacts::largest_force;
 use crate::domain::Vec2;
-use crate::force::{NetForces, Observables, largest_force};
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::models::droplet::NetForces;
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
+use crate::models::droplet::contact::solver::Method;
+use crate::models::droplet::contact::{ACCEPTED, ContactError, ContactLaw, Rule, due_tolerance};
 use crate::record::Outcome;
 use crate::scene::Scene;
+use crate::state::Frame;
+use crate::state::Packing;
 
 /// The worst of each residual over the frames, with the step at which it occurred.
 ///
 /// Residuals of lengths are relative to the largest `|δ|` among the frame's contacts, those of forces to its largest force.
-/// Each frame is held to the tolerance that is [due](crate::contact::due_tolerance) at its own `f_max`, the converged one
+/// Each frame is held to the tolerance that is [due](crate::models::droplet::contact::due_tolerance) at its own `f_max`, the converged one
 /// to the scene's.
 ///
 /// ```
@@ -76,7 +79,7 @@ struct Allowed {
 /// # Example
 ///
 /// ```
-/// use softjam::{relax::Relaxation, replay::Balance, scene::Scene};
+/// use softjam::{protocol::Relaxation, replay::Balance, scene::Scene};
 ///
 /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
 /// let mut run = Relaxation::new(&scene).unwrap();
@@ -327,7 +330,7 @@ impl Balance {
     /// off by `tolerance` (units of γ), 0 for the same bits.
     ///
     /// ```
-    /// use softjam::{record::Outcome, relax::Relaxation, replay::Balance, scene::Scene};
+    /// use softjam::{record::Outcome, protocol::Relaxation, replay::Balance, scene::Scene};
     ///
     /// let scene = Scene { particles: 48, phi: 0.9, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();

@@ -31,7 +31,7 @@ pub struct Comparison {
 ///
 /// ```
 /// use softjam::replay::{compare, Recording};
-/// # use softjam::{record, relax::Relaxation, scene::Scene};
+/// # use softjam::{record, protocol::Relaxation, scene::Scene};
 /// # let path = std::env::temp_dir().join("softjam-compare-example.rrd");
 /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// # let mut run = Relaxation::new(&scene).unwrap();

@@ -13,8 +13,8 @@ use super::tolerance;
 use super::turns::run_segments;
 use super::walk::{End, Segment};
 use super::{ReadError, Recording, State};
+use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{PROGRAM, Snapshots};
-use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::Scene;
 use crate::text::shown;
 use std::io::Read;
@@ -140,7 +140,7 @@ pub enum ReplayError {
 ///
 /// ```
 /// use softjam::replay::{determinism, Bytes, Recording, Way};
-/// # use softjam::{record, relax::Relaxation, scene::Scene};
+/// # use softjam::{record, protocol::Relaxation, scene::Scene};
 /// # let path = std::env::temp_dir().join("softjam-determinism-example.rrd");
 /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
 /// # let mut run = Relaxation::new(&scene).unwrap();

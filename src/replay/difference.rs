@@ -1,9 +1,9 @@
 //! Where two frames differ, told as a physicist would ask: which particle, by how much.
 
+use crate::analysis::Stability;
 use crate::domain::Vec2;
-use crate::frame::Frame;
-use crate::relax::Stability;
-use crate::relax::fire::FireState;
+use crate::minimize::fire::FireState;
+use crate::state::Frame;
 use crate::text::counted;
 use core::fmt;
 
@@ -12,7 +12,7 @@ use core::fmt;
 /// # Example
 ///
 /// ```
-/// use softjam::{frame::Frame, replay::Difference};
+/// use softjam::{state::Frame, replay::Difference};
 ///
 /// let (a, mut b) = (Frame { forces: vec![0.5], ..Frame::default() }, Frame::default());
 /// b.forces = vec![0.5_f64.next_up()];

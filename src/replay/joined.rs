@@ -3,9 +3,9 @@
 use super::source::{Ending, Item, Problem, Source};
 use super::{Event, ReadError, Recording};
 use crate::BITS;
-use crate::frame::Frame;
 use crate::record::Outcome;
 use crate::scene::{Channels, Scene};
+use crate::state::Frame;
 use crate::text::shown;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -46,7 +46,7 @@ impl Recording {
     ///
     /// ```
     /// use softjam::replay::Recording;
-    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
     /// # let path = std::env::temp_dir().join("softjam-joined-example.rrd");
     /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
     /// # let mut run = Relaxation::new(&scene).unwrap();

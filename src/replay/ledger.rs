@@ -6,7 +6,7 @@ use super::bytes::{self, Compared};
 use super::difference::{Difference, Row, What};
 use super::tolerance;
 use super::walk::End;
-use crate::force::{self, METRICS};
+use crate::analysis::{self, METRICS};
 use crate::record::Snapshot;
 use crate::scene::Schedule;
 use std::collections::BTreeMap;
@@ -140,7 +140,7 @@ impl Ledger {
             self.found.remove(&early);
         }
         let found = self.found.remove(&step).unwrap_or_default();
-        let expected: Option<force::Metrics> = snapshot.metrics;
+        let expected: Option<analysis::Metrics> = snapshot.metrics;
         let mut missing = Values::default();
         for (k, found) in found.into_iter().enumerate() {
             match (found, expected) {

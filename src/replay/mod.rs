@@ -36,9 +36,9 @@ pub use standing::Standing;
 #[cfg(feature = "figure")]
 pub(crate) use source::guarded;
 
-use crate::frame::{Frame, FrameError};
 use crate::record::Outcome;
 use crate::scene::SceneError;
+use crate::state::{Frame, FrameError};
 use crate::text::{lines, shown};
 
 /// Something that a recording holds behind its header.
@@ -53,7 +53,7 @@ pub enum Event {
     State(Frame),
     /// One scalar of `/metrics`.
     Metric {
-        /// Its name, one of [`METRICS`](crate::force::METRICS).
+        /// Its name, one of [`METRICS`](crate::analysis::METRICS).
         name: &'static str,
         /// The step.
         step: u64,

@@ -9,14 +9,15 @@ use super::standing::Standing;
 use super::steps::Steps;
 use super::walk::End;
 use super::{Event, ReadError, mcap, rrd};
+use crate::analysis::METRICS;
 use crate::budget::Budget;
-use crate::crowding::{self, Crowd};
 use crate::domain::{Domain, Vec2};
-use crate::force::METRICS;
-use crate::frame::{Frame, FrameError};
-use crate::packing::{Packing, coverage};
+use crate::neighbors::crowding;
+use crate::neighbors::crowding::Crowd;
 use crate::record::{Format, Leg, Outcome};
 use crate::scene::{Minimizer, Scene};
+use crate::state::{Frame, FrameError};
+use crate::state::{Packing, coverage};
 use crate::text::counted;
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
@@ -28,7 +29,7 @@ use std::path::Path;
 /// # Example
 ///
 /// ```
-/// use softjam::{record, relax::Relaxation, replay::{Event, Recording}, scene::Scene};
+/// use softjam::{record, protocol::Relaxation, replay::{Event, Recording}, scene::Scene};
 ///
 /// let path = std::env::temp_dir().join("softjam-recording-example.rrd");
 /// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
@@ -253,7 +254,7 @@ impl Recording {
     ///
     /// ```
     /// use softjam::replay::Recording;
-    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
     /// # let path = std::env::temp_dir().join("softjam-next-state-example.rrd");
     /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
     /// # let mut run = Relaxation::new(&scene).unwrap();
@@ -421,7 +422,7 @@ impl Recording {
     ///
     /// ```
     /// use softjam::replay::{Recording, Standing};
-    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
     /// # let path = std::env::temp_dir().join("softjam-standing-example.rrd");
     /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
     /// # let mut run = Relaxation::new(&scene).unwrap();

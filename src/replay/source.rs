@@ -3,10 +3,10 @@
 use super::ReadError;
 use crate::budget::Exceeded;
 use crate::domain::Domain;
-use crate::frame::Frame;
-use crate::packing::coverage;
 use crate::record::{FORMAT_VERSION, Leg, Outcome};
 use crate::scene::{Scene, SceneFields};
+use crate::state::Frame;
+use crate::state::coverage;
 use crate::text::counted;
 use crate::text::shown;
 use std::cell::Cell;

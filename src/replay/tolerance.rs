@@ -5,13 +5,15 @@
 
 use super::balance::{AMPLIFIED, Worst};
 use super::walk::Segment;
-use crate::contact::{ACCEPTED, FrameContacts, Rule, due_tolerance};
+use crate::contacts::FrameContacts;
+use crate::contacts::largest_force;
 use crate::domain::Vec2;
-use crate::force::{NetForces, largest_force};
-use crate::frame::Frame;
-use crate::packing::Packing;
-use crate::relax::{RelaxError, Relaxation};
+use crate::models::droplet::NetForces;
+use crate::models::droplet::contact::{ACCEPTED, Rule, due_tolerance};
+use crate::protocol::{RelaxError, Relaxation};
 use crate::scene::Scene;
+use crate::state::Frame;
+use crate::state::Packing;
 
 /// What two revisions may always differ by, relative to the largest force and to the mean radius.
 const ALLOWED: f64 = 1e-9;

@@ -4,8 +4,8 @@ use super::determinism::{Determinism, Origin, ReplayError, each_segment, go_on_b
 use super::ledger::Ledger;
 use super::walk::{End, Segment};
 use super::{Recording, State};
+use crate::protocol::{RelaxError, Relaxation};
 use crate::record::Snapshots;
-use crate::relax::{RelaxError, Relaxation};
 use crate::scene::Scene;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -150,7 +150,7 @@ fn work(scene: &Scene, segments: &Mutex<Receiver<(u64, Segment)>>, turns: &Turns
         let result = run.and_then(|run| match run {
             Ok(mut run) => {
                 let found = segment.walk(&mut run, scene, &mut Snapshots::default(), |s| {
-                    bytes += s.frame.as_ref().map_or(0, crate::frame::Frame::bytes);
+                    bytes += s.frame.as_ref().map_or(0, crate::state::Frame::bytes);
                     held.push(s);
                     if bytes < HELD_BYTES && held.len() < HELD {
                         return true;

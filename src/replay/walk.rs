@@ -2,11 +2,11 @@
 
 use super::Metrics;
 use super::difference::{self, Difference, What};
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{Leg, Outcome, Snapshot, Snapshots};
-use crate::relax::{RelaxError, Relaxation, Status};
 use crate::scene::{Scene, Schedule};
+use crate::state::Frame;
+use crate::state::Packing;
 use std::sync::Arc;
 
 /// The way from one recorded state to the next.

@@ -1,12 +1,12 @@
 //! A scene with gaps: what a file or the flags say, before defaults are filled in.
 
 use super::{Channels, Minimizer, Preparation, Radii, Scene, SceneError, Species, Start};
-use crate::contact::Rule;
-use crate::contact::solver::Method;
-use crate::disks::DiskParameters;
-use crate::droplet::contour::ContourStyle;
-use crate::force::Form;
-use crate::relax::fire::Fire;
+use crate::minimize::fire::Fire;
+use crate::models::disks::DiskParameters;
+use crate::models::droplet::Form;
+use crate::models::droplet::contact::Rule;
+use crate::models::droplet::contact::solver::Method;
+use crate::models::droplet::contour::ContourStyle;
 use std::io::Read as _;
 use std::path::Path;
 

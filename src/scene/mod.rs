@@ -26,12 +26,12 @@ mod validate;
 pub use fields::{DiskFields, SceneFields};
 pub use schedule::{Channels, Schedule};
 
-use crate::contact::solver::Method;
-use crate::contact::{ContactLaw, Rule};
-use crate::disks::DiskParameters;
-use crate::droplet::contour::ContourStyle;
-use crate::force::Form;
-use crate::relax::fire::Fire;
+use crate::minimize::fire::Fire;
+use crate::models::disks::DiskParameters;
+use crate::models::droplet::Form;
+use crate::models::droplet::contact::solver::Method;
+use crate::models::droplet::contact::{ContactLaw, Rule};
+use crate::models::droplet::contour::ContourStyle;
 use crate::text::{lines, shown};
 
 /// One kind of particle in a mixture.
@@ -134,10 +134,10 @@ pub enum Preparation {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Minimizer {
-    /// FIRE 2.0, see [`crate::relax::fire`].
+    /// FIRE 2.0, see [`crate::minimize::fire`].
     #[default]
     Fire,
-    /// FIRE through the rearrangements, then Newton's method, see [`crate::relax::newton`].
+    /// FIRE through the rearrangements, then Newton's method, see [`crate::minimize::newton`].
     #[serde(rename = "fire+newton")]
     FireNewton,
 }

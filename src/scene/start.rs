@@ -12,7 +12,7 @@ pub use super::start_file::{Coincidence, StartFile, read_csv};
 
 use super::{Radii, Scene, SceneError, Species, Start};
 use crate::domain::{Domain, Vec2};
-use crate::packing::Packing;
+use crate::state::Packing;
 use core::f64::consts::PI;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

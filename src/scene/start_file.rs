@@ -3,9 +3,9 @@
 use super::start_table::{self, Complaint, RESOLVED, Size, Table, blurred};
 use super::{Preparation, SceneError, Start};
 use crate::budget::Budget;
-use crate::crowding;
 use crate::domain::Vec2;
-use crate::packing::Packing;
+use crate::neighbors::crowding;
+use crate::state::Packing;
 use crate::text::shown;
 use std::collections::BTreeMap;
 use std::io::Read;

@@ -1,7 +1,7 @@
 //! The allowed ranges.
 
 use super::{Minimizer, Radii, Scene, SceneError, Start};
-use crate::contact::solver::Method;
+use crate::models::droplet::contact::solver::Method;
 
 /// What waits for a recorder or is under way in it, and in a second one or a live view, does not grow beyond this (bytes); 100 kB
 /// a particle if that is less.

@@ -1,12 +1,13 @@
 //! What several themes need: random numbers of the tests' own, packings to work on, and bounds that show their value.
 
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Rule};
-use softjam::disks::{self, DiskParameters};
 use softjam::domain::{Domain, Vec2};
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::disks;
+use softjam::models::disks::DiskParameters;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Species};
+use softjam::state::Packing;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -3,10 +3,10 @@
 use crate::common::Random;
 use crate::files::{open, states};
 use crate::replay::{record, replay, scene};
-use softjam::force::METRICS;
-use softjam::frame::Frame;
+use softjam::analysis::METRICS;
 use softjam::replay::{Event, ReadError, Way};
 use softjam::scene::Scene;
+use softjam::state::Frame;
 
 /// Where the numbers of a recorded state lie in the file: positions, velocities, contacts, forces, minimiser; without
 /// those that another state shares, like the contacts of a packing that has settled.

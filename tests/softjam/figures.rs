@@ -1,14 +1,14 @@
 //! Figures: what is drawn is what is there.
 
-use softjam::contact::ContactLaw;
 use softjam::domain::{Domain, Vec2};
 use softjam::figure::{
     Axis, ColorBy, Curve, Fall, Shape, Style, chart, packing as draw, pdf, png, relaxation,
 };
-use softjam::frame::Frame;
-use softjam::packing::Packing;
-use softjam::relax::Relaxation;
+use softjam::models::droplet::contact::ContactLaw;
+use softjam::protocol::Relaxation;
 use softjam::scene::Scene;
+use softjam::state::Frame;
+use softjam::state::Packing;
 
 fn frame_of(packing: &Packing) -> Frame {
     let mut law = ContactLaw::default();

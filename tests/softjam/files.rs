@@ -1,12 +1,12 @@
 //! Recordings in memory, of either format, and sinks that fail.
 
-use softjam::frame::Frame;
+use softjam::protocol::{Relaxation, Status};
 use softjam::record::{
     Format, Header, McapRecorder, Outcome, Recorder, RrdRecorder, Snapshot, Written,
 };
-use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::Scene;
+use softjam::state::Frame;
 use std::io::{self, Cursor, Write};
 
 pub const FORMATS: [Format; 2] = [Format::Rrd, Format::Mcap];

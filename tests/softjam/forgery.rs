@@ -3,10 +3,12 @@
 
 use crate::common::Random;
 use crate::files::{FORMATS, open, recorder};
+use softjam::analysis::METRICS;
+use softjam::analysis::Stability;
 use softjam::domain::Vec2;
-use softjam::force::{Form, METRICS};
+use softjam::models::droplet::Form;
+use softjam::protocol::{Relaxation, Status};
 use softjam::record::{Format, Header, Leg, Outcome, Snapshot};
-use softjam::relax::{Relaxation, Stability, Status};
 use softjam::replay::{Balance, Bytes, Event, Recording, Way, determinism};
 use softjam::scene::{Minimizer, Scene, Schedule};
 use std::io::Cursor;

@@ -5,14 +5,14 @@ use crate::files::{FORMATS, open, record_all, record_as, recorder};
 use softjam::budget::Budget;
 use softjam::convert;
 use softjam::domain::{Domain, Vec2};
-use softjam::frame::FrameError;
-use softjam::packing::Packing;
+use softjam::protocol::Relaxation;
 use softjam::record::{Format, Header, Snapshot, Writer};
-use softjam::relax::Relaxation;
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::{
     Channels, Preparation, Scene, SceneError, SceneFields, Schedule, Start, start,
 };
+use softjam::state::FrameError;
+use softjam::state::Packing;
 use std::io::{Cursor, Read};
 use std::time::{Duration, Instant};
 
@@ -243,7 +243,8 @@ fn dense_systems_too_large_to_solve_are_not_run() {
         ..Scene::default()
     };
     let dense = |header: &mut Header| {
-        header.scene.contact_solver = softjam::contact::solver::Method::GaussJordan;
+        header.scene.contact_solver =
+            softjam::models::droplet::contact::solver::Method::GaussJordan;
     };
     let bytes = forged(Format::Rrd, &scene, dense, |_| {});
     let mut recording = open(&bytes).expect("a header");

@@ -3,8 +3,8 @@
 use crate::common::{Folder, Random};
 use crate::files::{FORMATS, open, record_as, recorder, states};
 use softjam::convert::{self, ConvertError};
+use softjam::protocol::{Relaxation, Status};
 use softjam::record::{Format, Header, Snapshot, Writer};
-use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, Recording, Way, compare, determinism};
 use softjam::scene::{Channels, Scene, Schedule};
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 //! under another name. Each is read, or named for what it is.
 
 use crate::files::{open, recorder};
+use softjam::protocol::{Relaxation, Status};
 use softjam::record::{Format, Header, Outcome, Snapshot};
-use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Bytes, ReadError, Way, determinism};
 use softjam::scene::{Scene, Schedule};
 use std::collections::BTreeSet;

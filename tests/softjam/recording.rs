@@ -2,11 +2,11 @@
 
 use crate::common::Folder;
 use crate::files::{FORMATS, SmallDisk, open, record_all, record_as, recorder};
-use softjam::frame::Frame;
+use softjam::protocol::{Relaxation, Status};
 use softjam::record::{self, Header, Snapshot, Writer};
-use softjam::relax::{Relaxation, Status};
 use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::{Channels, Scene, Schedule};
+use softjam::state::Frame;
 use std::io;
 use std::path::Path;
 use std::thread::sleep;

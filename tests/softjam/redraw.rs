@@ -1,12 +1,12 @@
 //! Pictures that would look like the ones before them are left out, and only they.
 
 use crate::files::{FORMATS, open, record_as};
-use softjam::frame::Frame;
-use softjam::packing::Packing;
+use softjam::protocol::Relaxation;
 use softjam::record::Format;
-use softjam::relax::Relaxation;
 use softjam::replay::Event;
 use softjam::scene::{Channels, Scene, Schedule};
+use softjam::state::Frame;
+use softjam::state::Packing;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 

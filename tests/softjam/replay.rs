@@ -1,10 +1,11 @@
 //! Replay: a recording proves itself, and nothing that is done to it passes in silence.
 
 use crate::files::{open, record_as, states};
-use softjam::force::{Form, METRICS};
+use softjam::analysis::METRICS;
+use softjam::minimize::newton::Turns;
+use softjam::models::droplet::Form;
+use softjam::protocol::Relaxation;
 use softjam::record::{Format, Snapshot};
-use softjam::relax::Relaxation;
-use softjam::relax::newton::Turns;
 use softjam::replay::{
     Balance, Bytes, Determinism, Event, ReadError, Recording, ReplayError, Way, determinism,
 };
@@ -254,11 +255,11 @@ fn both_contact_rules_and_a_lattice_verify() {
     let base = scene();
     let scenes = [
         Scene {
-            contact_rule: softjam::contact::Rule::Saitoh,
+            contact_rule: softjam::models::droplet::contact::Rule::Saitoh,
             ..base.clone()
         },
         Scene {
-            contact_solver: softjam::contact::solver::Method::SparseCholesky,
+            contact_solver: softjam::models::droplet::contact::solver::Method::SparseCholesky,
             ..base.clone()
         },
         Scene {

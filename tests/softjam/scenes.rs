@@ -2,8 +2,8 @@
 
 mod start_file;
 
-use softjam::disks::DiskParameters;
-use softjam::relax::Relaxation;
+use softjam::models::disks::DiskParameters;
+use softjam::protocol::Relaxation;
 use softjam::scene::{Preparation, Radii, Scene, Species, Start};
 
 /// Asserts that a scene text is refused and that the message holds all of `words`.
@@ -358,7 +358,10 @@ fn scene_without_a_step_limit_survives_the_way_through_its_text() {
 fn the_name_that_saitohs_rule_had_until_version_0_2_is_read() {
     for name in ["saitoh", "seed"] {
         let scene = Scene::from_toml(&format!("contact_rule = \"{name}\"")).unwrap();
-        assert_eq!(scene.contact_rule, softjam::contact::Rule::Saitoh);
+        assert_eq!(
+            scene.contact_rule,
+            softjam::models::droplet::contact::Rule::Saitoh
+        );
         assert!(scene.to_toml().contains("contact_rule = \"saitoh\""));
     }
 }

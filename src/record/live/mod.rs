@@ -160,7 +160,7 @@ pub enum LiveError {
 ///
 /// ```
 /// use softjam::record::{self, Ended, Header, Live, Viewer, Writer};
-/// use softjam::{relax::Relaxation, scene::Scene};
+/// use softjam::{protocol::Relaxation, scene::Scene};
 ///
 /// let path = std::env::temp_dir().join("softjam-live-example.rrd");
 /// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };

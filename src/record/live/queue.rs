@@ -187,7 +187,7 @@ fn size(snapshot: &Snapshot) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relax::Relaxation;
+    use crate::protocol::Relaxation;
     use crate::scene::{Channels, Scene};
 
     #[test]

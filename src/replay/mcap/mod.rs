@@ -4,17 +4,17 @@ mod stream;
 
 use super::ReadError;
 use super::source::{Ending, Header, Item, Problem, Source, check_version, particles, read_scene};
+use crate::analysis::METRICS;
+use crate::analysis::Stability;
 use crate::budget::Budget;
 use crate::domain::{Domain, Vec2};
-use crate::force::METRICS;
-use crate::frame::Frame;
+use crate::minimize::fire::FireState;
 use crate::record::messages::{
     ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage, topic,
 };
 use crate::record::{Leg, Outcome, legs_from_text};
-use crate::relax::Stability;
-use crate::relax::fire::FireState;
 use crate::scene::Scene;
+use crate::state::Frame;
 use crate::text::shown;
 use mcap::records::{Channel, MessageHeader, Record};
 use prost::Message;

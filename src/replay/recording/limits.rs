@@ -1,11 +1,12 @@
 //! What is made of a recording only within limits: packings that could be ones, runs that fit in memory.
 
 use super::{ReadError, Recording};
-use crate::contact::solver::Method;
-use crate::crowding::{self, Crowd};
 use crate::domain::Vec2;
-use crate::frame::Frame;
-use crate::packing::Packing;
+use crate::models::droplet::contact::solver::Method;
+use crate::neighbors::crowding;
+use crate::neighbors::crowding::Crowd;
+use crate::state::Frame;
+use crate::state::Packing;
 use crate::text::counted;
 
 /// Bytes that the metrics of a step take while they wait for a state.
@@ -56,7 +57,7 @@ impl Recording {
     ///
     /// ```
     /// use softjam::replay::Recording;
-    /// # use softjam::{record, relax::Relaxation, scene::Scene};
+    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
     /// # let path = std::env::temp_dir().join("softjam-check-run-example.rrd");
     /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
     /// # let mut run = Relaxation::new(&scene).unwrap();

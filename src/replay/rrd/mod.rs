@@ -5,13 +5,13 @@ mod stream;
 
 use super::ReadError;
 use super::source::{Ending, Header, Item, Problem, Source, guarded};
+use crate::analysis::METRICS;
+use crate::analysis::Stability;
 use crate::budget::Budget;
 use crate::domain::Vec2;
-use crate::force::METRICS;
-use crate::frame::Frame;
+use crate::minimize::fire::FireState;
 use crate::record::Outcome;
-use crate::relax::Stability;
-use crate::relax::fire::FireState;
+use crate::state::Frame;
 use crate::text::shown;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::Chunk;

@@ -4,13 +4,13 @@ use super::model::Model;
 use crate::common::{
     Random, assert_at_most, converged, law, random_packing, relaxed_disks, scene, solved,
 };
-use softjam::contact::Rule;
-use softjam::contact::solver::Method;
+use softjam::analysis::Observables;
 use softjam::domain::{Domain, Vec2};
-use softjam::force::Observables;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::contact::Rule;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene};
+use softjam::state::Packing;
 
 /// The scenes whose ends are looked at.
 fn scenes() -> Vec<Scene> {

@@ -7,11 +7,11 @@ use crate::common::{
 };
 use proptest::prop_assert;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactError, ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
-use softjam::packing::Packing;
-use softjam::relax::Relaxation;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactError, ContactLaw, Rule};
+use softjam::protocol::Relaxation;
+use softjam::state::Packing;
 use std::cell::Cell;
 
 /// Packings for the uniqueness and the invariances: before, at and far from balance.

@@ -5,15 +5,16 @@
 //! `a = R + (R f/2πγ)(π cot(π/n) − n)`, which is also what Morse and Witten say, to all orders.
 
 use crate::common::{assert_at_most, monodisperse};
-use softjam::contact::list::ContactList;
-use softjam::contact::matrix::{ContactMatrix, Geometry};
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Contacts, Rule};
+use softjam::contacts::Contacts;
 use softjam::domain::{Domain, Vec2};
-use softjam::droplet::contour::{ContourStyle, Contours, Placement};
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::contact::list::ContactList;
+use softjam::models::droplet::contact::matrix::{ContactMatrix, Geometry};
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::models::droplet::contour::{ContourStyle, Contours, Placement};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, Start};
+use softjam::state::Packing;
 use std::f64::consts::PI;
 
 const METHODS: [Method; 3] = [

@@ -2,12 +2,12 @@
 //! the first digits of a seed.
 
 use crate::common::{Random, monodisperse, scene};
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactError, ContactLaw, Rule};
 use softjam::domain::{Domain, Vec2};
-use softjam::packing::Packing;
-use softjam::relax::{RelaxError, Relaxation, Status};
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactError, ContactLaw, Rule};
+use softjam::protocol::{RelaxError, Relaxation, Status};
 use softjam::scene::{Preparation, Radii, Scene, Start, start};
+use softjam::state::Packing;
 
 const METHODS: [Method; 3] = [
     Method::ConjugateGradient,

@@ -1,6 +1,6 @@
 //! The golden scenes end in the golden bits: in every build, on every machine, with or without recordings.
 
-use softjam::relax::Relaxation;
+use softjam::protocol::Relaxation;
 use softjam::scene::Scene;
 
 #[test]

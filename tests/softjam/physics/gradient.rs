@@ -4,13 +4,15 @@ use super::model::Model;
 use crate::common::{
     Random, assert_at_most, assert_within, converged, random_packing, relaxed_disks, scene,
 };
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Rule};
+use softjam::analysis::FrameForces;
+use softjam::analysis::Observables;
 use softjam::domain::{Domain, Vec2};
-use softjam::force::{Form, FrameForces, NetForces, Observables};
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::models::droplet::{Form, NetForces};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
+use softjam::state::Packing;
 
 /// The contact law to round-off.
 fn exact(packing: &Packing) -> ContactLaw {

@@ -5,11 +5,11 @@ use crate::common::{
     Random, assert_at_most, assert_within, converged, law, random_packing, relaxed_disks, scene,
     solved,
 };
-use softjam::contact::Rule;
-use softjam::contact::list::ContactList;
-use softjam::contact::matrix::{ContactMatrix, Geometry};
-use softjam::contact::solver::{LinearSolver, Method};
-use softjam::packing::Packing;
+use softjam::models::droplet::contact::Rule;
+use softjam::models::droplet::contact::list::ContactList;
+use softjam::models::droplet::contact::matrix::{ContactMatrix, Geometry};
+use softjam::models::droplet::contact::solver::{LinearSolver, Method};
+use softjam::state::Packing;
 
 /// All pairs whose undeformed surfaces are closer than `reach`.
 fn near_pairs(packing: &Packing, reach: f64) -> Vec<[u32; 2]> {

@@ -3,9 +3,9 @@
 //! Minimum images are looked for among all nine, gaps are taken between a particle and *every* image of another, `A` is
 //! a full matrix and solved by a dense Cholesky factorisation.
 
-use softjam::contact::matrix::ContactMatrix;
 use softjam::domain::Vec2;
-use softjam::packing::Packing;
+use softjam::models::droplet::contact::matrix::ContactMatrix;
+use softjam::state::Packing;
 use std::f64::consts::PI;
 
 /// `g(θ)`, eq. (2), of the angle between two vectors, `0 ≤ θ ≤ π`.

@@ -1,16 +1,16 @@
 //! FIRE and then Newton's method: how fast it finishes, where it ends, that it falls back and never fails.
 
 use crate::common::{answer, assert_at_most, converged, largest_difference, monodisperse, scene};
-use softjam::contact::Rule;
-use softjam::contact::solver::Method;
 use softjam::domain::Vec2;
-use softjam::force::Form;
-use softjam::frame::Frame;
-use softjam::packing::Packing;
-use softjam::relax::fire::FireState;
-use softjam::relax::newton::Turns;
-use softjam::relax::{Relaxation, Status};
+use softjam::minimize::fire::FireState;
+use softjam::minimize::newton::Turns;
+use softjam::models::droplet::Form;
+use softjam::models::droplet::contact::Rule;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Radii, Scene, Start, start};
+use softjam::state::Frame;
+use softjam::state::Packing;
 
 fn finishing(particles: usize, phi: f64, seed: u64) -> Scene {
     Scene {

@@ -4,13 +4,14 @@ use crate::common::{
     answer, assert_at_most, assert_within, converged, largest_difference, median, monodisperse,
     scene,
 };
-use softjam::contact::Rule;
-use softjam::contact::solver::Method;
-use softjam::disks::{self, DiskParameters};
-use softjam::frame::Frame;
-use softjam::relax::{Relaxation, Status};
+use softjam::models::disks;
+use softjam::models::disks::DiskParameters;
+use softjam::models::droplet::contact::Rule;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::numerics::threads;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Start, start};
-use softjam::threads;
+use softjam::state::Frame;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 #[test]

@@ -2,11 +2,12 @@
 
 use super::stress::stiffness::Spectrum;
 use crate::common::scene;
+use softjam::analysis::Stability;
 use softjam::domain::{Domain, Vec2};
-use softjam::force::Form;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Stability, Status};
+use softjam::models::droplet::Form;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
+use softjam::state::Packing;
 
 fn to_its_end(run: &mut Relaxation) {
     while run.status() == Status::Running {

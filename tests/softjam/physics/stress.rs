@@ -16,13 +16,14 @@ mod verify;
 
 use crate::common::Random;
 use families::Case;
-use softjam::contact::{ContactError, ContactLaw};
-use softjam::disks::{self, DiskParameters};
+use softjam::analysis::Stability;
 use softjam::domain::{Domain, Vec2};
-use softjam::force::Form;
-use softjam::packing::Packing;
-use softjam::relax::Stability;
+use softjam::models::disks;
+use softjam::models::disks::DiskParameters;
+use softjam::models::droplet::Form;
+use softjam::models::droplet::contact::{ContactError, ContactLaw};
 use softjam::scene::Scene;
+use softjam::state::Packing;
 use verify::Answer;
 
 /// The cases of a family.

@@ -1,12 +1,12 @@
 //! What is not needed is not computed: counts of work, not of seconds.
 
 use crate::common::{Folder, assert_at_most, converged, scene};
-use softjam::contact::solver::Method;
-use softjam::contact::{ContactLaw, Work};
-use softjam::force::Backbone;
-use softjam::packing::Packing;
-use softjam::relax::{Relaxation, Status};
+use softjam::analysis::Backbone;
+use softjam::models::droplet::contact::solver::Method;
+use softjam::models::droplet::contact::{ContactLaw, Work};
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Preparation, Scene, Start};
+use softjam::state::Packing;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 

@@ -235,7 +235,7 @@ fn what_is_left_of_a_killed_run_and_its_rest_are_joined_to_the_bytes_of_the_whol
 #[test]
 fn an_interrupted_run_and_its_rest_are_joined_to_the_bytes_of_the_whole() {
     use softjam::record::{Header, Writer, record};
-    use softjam::{relax::Relaxation, scene::Scene};
+    use softjam::{protocol::Relaxation, scene::Scene};
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     let scene = Scene {

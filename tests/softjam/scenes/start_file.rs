@@ -1,10 +1,10 @@
 //! Start files that are no packing: the message names the file, the line and what stands there.
 
 use softjam::domain::Vec2;
-use softjam::packing::Packing;
-use softjam::relax::Relaxation;
+use softjam::protocol::Relaxation;
 use softjam::scene::start::{StartFile, read_csv};
 use softjam::scene::{Preparation, Scene, SceneError, Start};
+use softjam::state::Packing;
 
 /// What a scene that starts from a file of these bytes says.
 fn complaint(bytes: &[u8]) -> String {

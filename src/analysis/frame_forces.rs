@@ -1,0 +1,123 @@
+//! The forces of a frame that comes from a file, or from anywhere else.
+
+use super::{Backbone, Observables};
+use crate::contacts::FrameContacts;
+use crate::contacts::largest_force;
+use crate::domain::Vec2;
+use crate::models::droplet::{Form, NetForces};
+use crate::state::Frame;
+use crate::state::Packing;
+
+/// Net forces, torques and observables of a frame, in either [form](Form): the bits of the run that it comes from.
+///
+/// # Example
+///
+/// Of the last state of a recording:
+///
+/// ```
+/// # #[cfg(feature = "recording")] {
+/// use softjam::{analysis::FrameForces, replay::Recording};
+/// # use softjam::{models::droplet::Form, record, protocol::Relaxation, scene::Scene};
+/// # let path = std::env::temp_dir().join("softjam-frame-forces-example.rrd");
+/// # let scene = Scene { particles: 32, phi: 0.9, forces: Form::Gradient, ..Scene::default() };
+/// # let mut run = Relaxation::new(&scene).unwrap();
+/// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
+/// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
+///
+/// let mut recording = Recording::open(&path).unwrap();
+/// let mut last = None;
+/// while let Some(state) = recording.next_state().unwrap() {
+///     last = Some(state.frame);
+/// }
+/// let frame = last.unwrap();
+/// let packing = recording.packing(&frame).unwrap();
+/// let scene = recording.scene();
+/// let forces = FrameForces::of(&packing, &frame, scene.line_tension, scene.forces);
+/// assert_eq!(forces.net().len(), 32);
+/// assert!(forces.observables().f_max <= scene.threshold);
+/// # std::fs::remove_file(&path).unwrap();
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct FrameForces {
+    net: Vec<Vec2>,
+    torques: Vec<f64>,
+    observables: Observables,
+}
+
+impl FrameForces {
+    /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `line_tension` is γ (force), `form`
+    /// the scene's [`forces`](crate::scene::Scene::forces).
+    ///
+    /// # Panics
+    ///
+    /// If the frame does not [belong](Frame::validate) to the packing.
+    ///
+    /// ```
+    /// use softjam::{analysis::FrameForces, models::droplet::Form, protocol::Relaxation, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, phi: 0.9, forces: Form::Gradient, ..Scene::default() };
+    /// let run = Relaxation::new(&scene).unwrap();
+    /// let forces = FrameForces::of(run.packing(), &run.frame(), scene.line_tension, scene.forces);
+    /// assert_eq!(forces.net(), run.net_forces());
+    /// assert_eq!(forces.observables(), &run.observables());
+    /// ```
+    #[must_use]
+    pub fn of(packing: &Packing, frame: &Frame, line_tension: f64, form: Form) -> Self {
+        let contacts = FrameContacts::of(packing, frame);
+        let contacts = contacts.view();
+        let mut forces = NetForces::new(form);
+        let mut net = vec![Vec2::zeros(); packing.len()];
+        forces.evaluate(&contacts, packing, line_tension, &mut net);
+        let torques = forces.torques().to_vec();
+        let f_max = largest_force(&net) / line_tension;
+        let observables = Observables::counted(
+            &contacts,
+            packing.domain(),
+            packing.len(),
+            line_tension,
+            (f_max, frame.minimizer.dt),
+            &mut Backbone::default(),
+        );
+        let observables = if torques.is_empty() {
+            observables
+        } else {
+            observables.with_torques(&contacts, packing.domain(), line_tension, &torques)
+        };
+        Self {
+            net,
+            torques,
+            observables,
+        }
+    }
+
+    /// The net force `F_i` on each particle (force).
+    ///
+    /// See the example of [`FrameForces::of`].
+    #[must_use]
+    pub fn net(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    /// The torque `τ_c` of each contact (force·length); empty for the central form.
+    ///
+    /// ```
+    /// use softjam::{analysis::FrameForces, models::droplet::Form, protocol::Relaxation, scene::Scene};
+    ///
+    /// let run = Relaxation::new(&Scene { particles: 32, phi: 0.9, ..Scene::default() }).unwrap();
+    /// let torques = |form| FrameForces::of(run.packing(), &run.frame(), 1.0, form).torques().len();
+    /// assert_eq!((torques(Form::Central), torques(Form::Gradient)), (0, run.contacts().pairs.len()));
+    /// ```
+    #[must_use]
+    pub fn torques(&self) -> &[f64] {
+        &self.torques
+    }
+
+    /// Balance, energy, stress and coordination.
+    ///
+    /// See the example of [`FrameForces::of`].
+    #[must_use]
+    pub fn observables(&self) -> &Observables {
+        &self.observables
+    }
+}

@@ -1,0 +1,282 @@
+//! What a frame is worth in numbers: balance, energy, pressure, stress, coordination.
+
+use super::{Backbone, sums::Sums};
+use crate::contacts::Contacts;
+use crate::domain::Domain;
+use crate::models::droplet::contact::ContactLaw;
+use crate::state::Packing;
+
+/// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
+///
+/// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
+///
+/// ```
+/// assert_eq!(softjam::analysis::METRICS.len(), 9);
+/// ```
+pub const METRICS: [&str; 9] = [
+    "f_max",
+    "log10_f_max",
+    "energy",
+    "pressure",
+    "coordination",
+    "contacts",
+    "rattlers",
+    "dt",
+    "stress_xy",
+];
+
+/// The values of [`METRICS`].
+///
+/// See the example of [`Observables::metrics`].
+pub type Metrics = [f64; METRICS.len()];
+
+/// What a frame is worth in numbers, all in units of the line tension γ: they do not depend on its value.
+///
+/// # Example
+///
+/// ```
+/// use softjam::{protocol::Relaxation, scene::Scene};
+///
+/// let relaxation = Relaxation::new(&Scene { particles: 64, phi: 0.9, ..Scene::default() }).unwrap();
+/// let o = relaxation.observables();
+/// assert!(o.coordination() > 4.0);
+/// assert!((o.pressure() + 0.5 * (o.stress[0] + o.stress[2])).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Observables {
+    /// Number of particles `N`.
+    pub particles: usize,
+    /// Largest net force `f_max` (units of γ).
+    pub f_max: f64,
+    /// Stored energy of the contact problem `U = ½ Σ_c δ_c f_c` (γ·length).
+    pub energy: f64,
+    /// Stress `(σ_xx, σ_xy, σ_yy)`, tension positive (γ/length); see the [module](super#stress).
+    pub stress: [f64; 3],
+    /// Number of contacts with `f > 0`.
+    pub contacts: usize,
+    /// Number of contacts among the particles that are held.
+    pub backbone_contacts: usize,
+    /// Number of rattlers: particles with fewer than three contacts with `f > 0`, not counting contacts with rattlers.
+    ///
+    /// Without friction two contacts hold a particle only if they face each other exactly. Until the last digit is
+    /// relaxed a rattler rests on a neighbour with some force below `f_max`; counting contacts alone would miss it.
+    pub rattlers: usize,
+    /// The minimiser's time step.
+    pub dt: f64,
+}
+
+impl Observables {
+    /// Observables of contacts in `domain` at line tension γ (force), with `f_max` in units of γ and the time step `dt`.
+    ///
+    /// # Panics
+    ///
+    /// If a contact names a particle of index ≥ `particles`.
+    ///
+    /// ```
+    /// use softjam::{contacts::Contacts, domain::{Domain, Vec2}, analysis::Observables};
+    ///
+    /// let contacts = Contacts {
+    ///     pairs: &[[0, 1]],
+    ///     normals: &[Vec2::new(-1.0, 0.0)],
+    ///     distances: &[0.9],
+    ///     overlaps: &[0.1],
+    ///     forces: &[0.4],
+    /// };
+    /// let o = Observables::of(&contacts, Domain::new(6.0, 6.0).unwrap(), 3, 1.0, (0.4, 0.1));
+    /// assert_eq!((o.contacts, o.rattlers, o.coordination()), (1, 3, 0.0), "one contact holds nobody");
+    /// assert_eq!(o.energy, 0.5 * 0.1 * 0.4);
+    /// assert!((o.pressure() - 0.4 * 0.9 / 72.0).abs() < 1e-16);
+    /// ```
+    #[must_use]
+    pub fn of(
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        particles: usize,
+        line_tension: f64,
+        (f_max, dt): (f64, f64),
+    ) -> Self {
+        let counter = &mut Backbone::default();
+        Self::counted(
+            contacts,
+            domain,
+            particles,
+            line_tension,
+            (f_max, dt),
+            counter,
+        )
+    }
+
+    /// [`of`](Self::of) with a counter of rattlers that remembers the frame before.
+    ///
+    /// # Panics
+    ///
+    /// If a contact names a particle of index ≥ `particles`.
+    ///
+    /// See the example of [`Backbone`].
+    #[must_use]
+    pub fn counted(
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        particles: usize,
+        line_tension: f64,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
+        let mut o = Self::summed(contacts, domain, line_tension);
+        (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
+        (o.rattlers, o.backbone_contacts) =
+            backbone.count_touching(particles, contacts, o.contacts);
+        o
+    }
+
+    /// [`counted`](Self::counted) with the contacts that `law` found last: the same bits, and the contacts need not be put in
+    /// order for it.
+    pub(crate) fn of_law(
+        law: &ContactLaw,
+        packing: &Packing,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
+        let particles = packing.len();
+        let mut o = Self::summed(&law.numbered(), packing.domain(), law.line_tension());
+        (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
+        (o.rattlers, o.backbone_contacts) = backbone.count_law(particles, law, o.contacts);
+        o
+    }
+
+    /// What is summed over contacts, in whatever order.
+    fn summed(contacts: &Contacts<'_>, domain: Domain, line_tension: f64) -> Self {
+        let sums = Sums::of(contacts);
+        let scale = domain.area() * line_tension;
+        Self {
+            energy: 0.5 * sums.work / line_tension,
+            stress: sums.moments.map(|sum| (0.0 - sum) / scale),
+            contacts: sums.touching,
+            ..Self::default()
+        }
+    }
+
+    /// These observables with the stress of the torques added: `σ_αβ −= (1/V) Σ_c τ_c ½ (t_α n_β + t_β n_α)`, with `t` the
+    /// normal turned by a quarter. It belongs to the [gradient form](crate::models::droplet::Form::Gradient) and has no trace: energy and pressure
+    /// are those of the central form.
+    ///
+    /// ```
+    /// use softjam::{contacts::Contacts, domain::{Domain, Vec2}, analysis::Observables};
+    ///
+    /// let contacts = Contacts {
+    ///     pairs: &[[0, 1]],
+    ///     normals: &[Vec2::new(-1.0, 0.0)],
+    ///     distances: &[0.9],
+    ///     overlaps: &[0.1],
+    ///     forces: &[0.4],
+    /// };
+    /// let domain = Domain::new(6.0, 6.0).unwrap();
+    /// let o = Observables::default().with_torques(&contacts, domain, 1.0, &[0.36]);
+    /// assert_eq!(o.stress, [0.0, -0.36 / 72.0, 0.0]);
+    /// ```
+    #[must_use]
+    pub fn with_torques(
+        mut self,
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        line_tension: f64,
+        torques: &[f64],
+    ) -> Self {
+        let mut sums = [0.0; 2];
+        for (n, torque) in contacts.normals.iter().zip(torques) {
+            sums[0] += torque * n.x * n.y;
+            sums[1] += 0.5 * torque * (n.x * n.x - n.y * n.y);
+        }
+        let scale = domain.area() * line_tension;
+        self.stress[0] += sums[0] / scale;
+        self.stress[1] -= sums[1] / scale;
+        self.stress[2] -= sums[0] / scale;
+        self
+    }
+
+    /// The metrics as they are recorded, in the order of [`METRICS`].
+    ///
+    /// ```
+    /// # use softjam::analysis::{METRICS, Observables};
+    /// let metrics = Observables { f_max: 0.01, ..Observables::default() }.metrics();
+    /// assert_eq!(METRICS[..2], ["f_max", "log10_f_max"]);
+    /// assert_eq!(metrics[..2], [0.01, -2.0]);
+    /// ```
+    #[must_use]
+    pub fn metrics(&self) -> Metrics {
+        [
+            self.f_max,
+            libm::log10(self.f_max.max(1e-18)),
+            self.energy,
+            self.pressure(),
+            self.coordination(),
+            self.contacts as f64,
+            self.rattlers as f64,
+            self.dt,
+            self.stress[1],
+        ]
+    }
+
+    /// `σ_xx` (γ/length), tension positive: negative in a compressed packing.
+    ///
+    /// ```
+    /// # use softjam::analysis::Observables;
+    /// let o = Observables { stress: [-0.2, 0.1, -0.4], ..Observables::default() };
+    /// assert_eq!((o.stress_xx(), o.stress_xy(), o.stress_yy()), (-0.2, 0.1, -0.4));
+    /// ```
+    #[must_use]
+    pub fn stress_xx(&self) -> f64 {
+        self.stress[0]
+    }
+
+    /// `σ_xy = σ_yx` (γ/length).
+    ///
+    /// See the example of [`stress_xx`](Self::stress_xx).
+    #[must_use]
+    pub fn stress_xy(&self) -> f64 {
+        self.stress[1]
+    }
+
+    /// `σ_yy` (γ/length), tension positive.
+    ///
+    /// See the example of [`stress_xx`](Self::stress_xx).
+    #[must_use]
+    pub fn stress_yy(&self) -> f64 {
+        self.stress[2]
+    }
+
+    /// Pressure `p = −tr σ/2 = (1/2V) Σ_c f_c r_c` (γ/length).
+    ///
+    /// ```
+    /// # use softjam::analysis::Observables;
+    /// let o = Observables { stress: [-0.2, 0.0, -0.4], ..Observables::default() };
+    /// assert!((o.pressure() - 0.3).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn pressure(&self) -> f64 {
+        // Adding 0 makes the pressure of no contacts 0 and not −0.
+        -0.5 * (self.stress[0] + self.stress[2]) + 0.0
+    }
+
+    /// Mean coordination number of the particles that are held, `Z = 2 N_c / (N − N_rattlers)`, `N_c` the contacts
+    /// among them; 0 when all rattle.
+    ///
+    /// ```
+    /// # use softjam::analysis::Observables;
+    /// let o = Observables { particles: 10, rattlers: 2, backbone_contacts: 16, ..Observables::default() };
+    /// assert_eq!(o.coordination(), 4.0);
+    /// ```
+    #[must_use]
+    pub fn coordination(&self) -> f64 {
+        mean_coordination(self.backbone_contacts, self.particles - self.rattlers)
+    }
+}
+
+/// `Z = 2 N_c / N` of `held` particles with `contacts` among them; 0 where there is none.
+pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
+    if held == 0 {
+        0.0
+    } else {
+        2.0 * contacts as f64 / held as f64
+    }
+}

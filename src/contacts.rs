@@ -1,0 +1,204 @@
+//! What every model tells about its contacts: pairs, normals, distances, overlaps and forces; and the net forces that they add up to.
+
+use crate::domain::Vec2;
+use crate::numerics::wide::wide;
+use crate::state::{Frame, Packing, unit_and_length};
+use core::ops::Range;
+
+/// The contacts of a packing with what a balance of forces needs: one entry a contact in every slice.
+///
+/// # Example
+///
+/// ```
+/// use softjam::models::droplet::contact::ContactLaw;
+/// use softjam::domain::{Domain, Vec2};
+/// use softjam::state::Packing;
+///
+/// let at = |x| Vec2::new(x, 2.0);
+/// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
+/// let mut law = ContactLaw::default();
+/// law.solve(&packing, &[], &[]).unwrap();
+/// let contacts = law.contacts();
+/// assert_eq!(contacts.pairs, [[0, 1]]);
+/// // One contact on its own is a spring of stiffness 4πγ / 3 (R_i + R_j).
+/// assert!((contacts.forces[0] - 0.1 * 4.0 * std::f64::consts::PI / 3.0).abs() < 1e-13);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Contacts<'a> {
+    /// The pairs `[i, j]`, `i < j`, ascending.
+    pub pairs: &'a [[u32; 2]],
+    /// The unit vectors `n_ij` from `j` to `i`.
+    pub normals: &'a [Vec2],
+    /// The centre distances `r_ij` (length).
+    pub distances: &'a [f64],
+    /// The overlaps of the undeformed disks `δ_ij` (length).
+    pub overlaps: &'a [f64],
+    /// The force magnitudes `f_ij` (force); `f_ij n_ij` acts on `i`.
+    pub forces: &'a [f64],
+}
+
+/// The contacts of a frame, with their geometry recomputed from its positions: the same bits as in the run.
+///
+/// # Example
+///
+/// ```
+/// use softjam::contacts::FrameContacts;
+/// use softjam::protocol::Relaxation;
+/// use softjam::scene::Scene;
+///
+/// let relaxation = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+/// let contacts = FrameContacts::of(relaxation.packing(), &relaxation.frame());
+/// assert_eq!(contacts.view().overlaps, relaxation.contacts().overlaps);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct FrameContacts {
+    pairs: Vec<[u32; 2]>,
+    normals: Vec<Vec2>,
+    distances: Vec<f64>,
+    overlaps: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+impl FrameContacts {
+    /// The contacts of `frame`; `packing` gives the radii and the box, its positions are not used.
+    ///
+    /// # Panics
+    ///
+    /// If the frame names a particle that the packing lacks; a frame that came through [`Frame::validate`] does not.
+    ///
+    /// See the example of [`FrameContacts`].
+    #[must_use]
+    pub fn of(packing: &Packing, frame: &Frame) -> Self {
+        let mut contacts = Self {
+            pairs: frame.contacts.clone(),
+            forces: frame.forces.clone(),
+            ..Self::default()
+        };
+        let domain = packing.domain();
+        for &[i, j] in &frame.contacts {
+            let (i, j) = (i as usize, j as usize);
+            let separation = domain.minimum_image(frame.positions[i] - frame.positions[j]);
+            let (normal, distance) = unit_and_length(separation);
+            contacts.normals.push(normal);
+            contacts.distances.push(distance);
+            contacts
+                .overlaps
+                .push(packing.radii()[i] + packing.radii()[j] - distance);
+        }
+        contacts
+    }
+
+    /// Those `stretches` of `contacts`, one after the other.
+    pub(crate) fn picked(contacts: &Contacts<'_>, stretches: &[Range<usize>]) -> Self {
+        Self {
+            pairs: picked(contacts.pairs, stretches),
+            normals: picked(contacts.normals, stretches),
+            distances: picked(contacts.distances, stretches),
+            overlaps: picked(contacts.overlaps, stretches),
+            forces: picked(contacts.forces, stretches),
+        }
+    }
+
+    /// The contacts as slices.
+    ///
+    /// ```
+    /// assert!(softjam::contacts::FrameContacts::default().view().pairs.is_empty());
+    /// ```
+    #[must_use]
+    pub fn view(&self) -> Contacts<'_> {
+        Contacts {
+            pairs: &self.pairs,
+            normals: &self.normals,
+            distances: &self.distances,
+            overlaps: &self.overlaps,
+            forces: &self.forces,
+        }
+    }
+}
+
+/// Stretches of `values`, one after the other.
+fn picked<T: Copy>(values: &[T], stretches: &[Range<usize>]) -> Vec<T> {
+    let mut picked = Vec::with_capacity(values.len());
+    for stretch in stretches {
+        picked.extend_from_slice(&values[stretch.clone()]);
+    }
+    picked
+}
+
+/// Net forces of the contacts on each particle, `F_i = Σ_j f_ij n_ij` (force), summed in the order of the contact list.
+///
+/// # Panics
+///
+/// If a contact names a particle beyond `net`.
+///
+/// # Example
+///
+/// ```
+/// use softjam::contacts::Contacts;
+/// use softjam::domain::Vec2;
+/// use softjam::contacts::net_forces;
+///
+/// let contacts = Contacts {
+///     pairs: &[[0, 1]],
+///     normals: &[Vec2::new(-1.0, 0.0)],
+///     distances: &[0.9],
+///     overlaps: &[0.1],
+///     forces: &[0.4],
+/// };
+/// let mut net = vec![Vec2::zeros(); 2];
+/// net_forces(&contacts, &mut net);
+/// assert_eq!(net, [Vec2::new(-0.4, 0.0), Vec2::new(0.4, 0.0)]);
+/// ```
+pub fn net_forces(contacts: &Contacts<'_>, net: &mut [Vec2]) {
+    net.fill(Vec2::zeros());
+    let forces = contacts.normals.iter().zip(contacts.forces);
+    let Some(&[mut first, _]) = contacts.pairs.first() else {
+        return;
+    };
+    // Contacts of one particle follow each other: its sum stays out of memory until they end.
+    let mut sum_of_first = Vec2::zeros();
+    for (&[i, j], (n, &f)) in contacts.pairs.iter().zip(forces) {
+        let force = n * f;
+        if i != first {
+            net[first as usize] = sum_of_first;
+            (first, sum_of_first) = (i, net[i as usize]);
+        }
+        sum_of_first += force;
+        net[j as usize] -= force;
+    }
+    net[first as usize] = sum_of_first;
+}
+
+/// `f_max`, the largest magnitude of a net force (force): the measure of equilibrium, Saitoh 2.4.
+///
+/// # Example
+///
+/// ```
+/// use softjam::{domain::Vec2, contacts::largest_force};
+/// assert_eq!(largest_force(&[Vec2::new(3.0, 4.0), Vec2::new(1.0, 0.0)]), 5.0);
+/// assert!(largest_force(&[Vec2::new(f64::NAN, 4.0), Vec2::new(1.0, 0.0)]).is_nan());
+/// ```
+#[must_use]
+pub fn largest_force(net: &[Vec2]) -> f64 {
+    let (net4, rest) = net.as_chunks::<4>();
+    let larger = |m: f64, s: f64| if s > m { s } else { m };
+    let (most, sums) = wide(
+        #[inline(always)]
+        || {
+            // A NaN hides behind comparisons, not behind a sum.
+            let (mut most, mut sums) = ([0.0; 4], [0.0; 4]);
+            for f in net4 {
+                for k in 0..4 {
+                    let squared = f[k].x * f[k].x + f[k].y * f[k].y;
+                    most[k] = larger(most[k], squared);
+                    sums[k] += squared;
+                }
+            }
+            (most, sums)
+        },
+    );
+    let rest = rest.iter().map(Vec2::norm_squared);
+    let sum: f64 = sums.into_iter().chain(rest.clone()).sum();
+    let most = most.into_iter().chain(rest).fold(0.0, larger);
+    if sum.is_nan() { sum } else { most.sqrt() }
+}

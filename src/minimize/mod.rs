@@ -1,0 +1,4 @@
+//! Minimisers: what moves the particles towards balance. Each has its own numbers, which a frame carries under its name.
+
+pub mod fire;
+pub mod newton;

@@ -1,0 +1,488 @@
+//! [`ContactLaw`]: positions in, contacts and forces out.
+
+use super::bulges::Bulges;
+use super::complementarity::Offence;
+use super::error::ContactError;
+use super::list::ContactList;
+use super::matrix::{ContactMatrix, Geometry, Precision};
+use super::patch::Patch;
+use super::present::{Present, name_of};
+use super::product::FirstProducts;
+use super::search::Search;
+use super::solver::{LinearSolver, Method};
+use super::tolerance::{ACCEPTED, relative_tolerance, slack};
+use crate::neighbors::NeighborList;
+use crate::state::Packing;
+use core::f64::consts::PI;
+use std::sync::OnceLock;
+
+/// How the contact list follows the positions.
+///
+/// ```
+/// assert_eq!(softjam::models::droplet::contact::Rule::default(), softjam::models::droplet::contact::Rule::Complementarity);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// The contact law is solved in every step: forces and gaps are ≥ 0 and the list depends on the positions alone.
+    #[default]
+    Complementarity,
+    /// Saitoh 2.2.5: in every step solve, drop the contacts with `f < 0`, add the pairs with `Δ > 0`, solve once more. The
+    /// list is then a matter of history and a force can be negative for a step. (`f = 0` is dropped too, and `Δ` has to
+    /// exceed the solver's tolerance.)
+    ///
+    /// Until version 0.2 it was called `seed`, which scenes may still say.
+    #[serde(alias = "seed")]
+    Saitoh,
+}
+
+/// The contact law: a solver of the contact problem with its settings, its buffers and its last answer.
+///
+/// # Example
+///
+/// A particle pressed between two others bulges sideways and touches a fourth that no undeformed disk would reach:
+///
+/// ```
+/// use softjam::models::droplet::contact::ContactLaw;
+/// use softjam::domain::{Domain, Vec2};
+/// use softjam::state::Packing;
+///
+/// let packing = Packing::new(
+///     Domain::new(9.0, 9.0).unwrap(),
+///     vec![0.5; 4],
+///     vec![Vec2::new(3.0, 3.0), Vec2::new(3.9, 3.0), Vec2::new(4.8, 3.0), Vec2::new(3.9, 4.005)],
+/// ).unwrap();
+/// let mut law = ContactLaw::default();
+/// law.solve(&packing, &[], &[]).unwrap();
+/// assert_eq!(law.contacts().pairs, [[0, 1], [1, 2], [1, 3]]);
+/// assert!(law.contacts().overlaps[2] < 0.0 && law.contacts().forces[2] > 0.0);
+/// assert!(law.residual() < 1e-12);
+/// ```
+#[derive(Clone, Debug)]
+pub struct ContactLaw {
+    pub(super) rule: Rule,
+    pub(super) line_tension: f64,
+    pub(super) tolerance: f64,
+    pub(super) solver: LinearSolver,
+    pub(super) neighbors: NeighborList,
+    pub(super) list: ContactList,
+    pub(super) geometry: Geometry,
+    pub(super) matrix: ContactMatrix,
+    /// The contacts by number: ascending when the structure is built, then those that came since, in the order in which they
+    /// came. Which numbers they have reaches no bit of a result.
+    pub(super) pairs: Vec<[u32; 2]>,
+    /// Their forces; 0 for contacts at rest.
+    pub(super) forces: Vec<f64>,
+    /// The numbers of the contacts that have left since the structure was built: they are at rest.
+    pub(super) at_rest: Vec<u32>,
+    /// Contacts that came since the structure was built, in any order.
+    pub(super) added: Vec<[u32; 2]>,
+    /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
+    /// and is called now.
+    pub(super) changes: Vec<([u32; 2], bool)>,
+    pub(super) sets: (u64, u64),
+    /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
+    pub(super) structured: bool,
+    pub(super) refreshed: bool,
+    /// The contacts in their order, if somebody asked for them.
+    pub(super) present: OnceLock<Present>,
+    /// The neighbour list without `pairs`, and whether it is up to date.
+    pub(super) others: Vec<[u32; 2]>,
+    pub(super) parted: bool,
+    /// What the first residual of this solution is computed in.
+    pub(super) precision: Precision,
+    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
+    pub(super) slack: f64,
+    pub(super) image: Vec<f64>,
+    pub(super) products: FirstProducts,
+    pub(super) bulges: Bulges,
+    /// The largest bulge that the neighbour list is known to cover at the present positions.
+    pub(super) covered: f64,
+    /// The largest overlap of contours outside the set that the tolerance lets pass (length).
+    pub(super) tolerated: f64,
+    /// Searches for pairs that touch, in each of two threads.
+    pub(super) searches: [Search; 2],
+    pub(super) patch: Patch,
+    /// Particles whose bulge is beyond all reason, the first of them.
+    pub(super) diverged: Option<(usize, f64)>,
+    pub(super) offending: Vec<Offence>,
+    /// How far the particles may have moved since the neighbour list was looked at (length).
+    pub(super) moved: f64,
+    /// The largest `|δ|` of the contacts (length).
+    pub(super) scale: f64,
+    /// The largest `|A f − δ|` (length).
+    pub(super) off: f64,
+    pub(super) residual: f64,
+    pub(super) work: Work,
+}
+
+/// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
+///
+/// ```
+/// assert_eq!(softjam::models::droplet::contact::ContactLaw::default().work().solves, 0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Contact problems solved.
+    pub solves: u64,
+    /// Linear systems solved.
+    pub sweeps: u64,
+    /// Iterations of the linear solver.
+    pub iterations: u64,
+    /// Exchanges of few contacts after which only the forces around them were solved for.
+    pub patches: u64,
+    /// Iterations of the linear solver on such patches.
+    pub patch_iterations: u64,
+    /// Geometries computed of all contacts; after an exchange only that of new ones is.
+    pub assemblies: u64,
+    /// Those of which entries were computed in single precision, which is enough far from balance.
+    pub singles: u64,
+    /// Structures of the contact set (lists, places in `A`) built.
+    pub structures: u64,
+    /// Matrices whose entries were kept in double precision; far above round-off their products with the forces are enough.
+    pub values: u64,
+    /// Symbolic factorisations; none unless the solver is the sparse Cholesky.
+    pub symbolic: u64,
+    /// Distances computed of pairs outside the set.
+    pub distances: u64,
+    /// Gaps evaluated of pairs outside the set.
+    pub gaps: u64,
+    /// Neighbour lists built.
+    pub neighbor_lists: u64,
+}
+
+impl Default for ContactLaw {
+    fn default() -> Self {
+        Self::new(Rule::default(), Method::default(), 1.0, 1e-12)
+    }
+}
+
+impl ContactLaw {
+    /// A law with line tension γ (force, positive) and a `tolerance` on the residual relative to the largest overlap.
+    ///
+    /// ```
+    /// use softjam::models::droplet::contact::solver::Method;
+    /// use softjam::models::droplet::contact::{ContactLaw, Rule};
+    /// let law = ContactLaw::new(Rule::Complementarity, Method::SparseCholesky, 1.0, 1e-12);
+    /// assert!(law.contacts().pairs.is_empty());
+    /// ```
+    #[must_use]
+    pub fn new(rule: Rule, method: Method, line_tension: f64, tolerance: f64) -> Self {
+        Self {
+            rule,
+            line_tension,
+            tolerance,
+            solver: LinearSolver::new(method),
+            neighbors: NeighborList::new(),
+            list: ContactList::default(),
+            geometry: Geometry::default(),
+            matrix: ContactMatrix::default(),
+            pairs: Vec::new(),
+            forces: Vec::new(),
+            at_rest: Vec::new(),
+            added: Vec::new(),
+            changes: Vec::new(),
+            sets: (0, 0),
+            structured: false,
+            refreshed: false,
+            present: OnceLock::new(),
+            others: Vec::new(),
+            parted: false,
+            precision: Precision::Double,
+            slack: 0.0,
+            image: Vec::new(),
+            products: FirstProducts::default(),
+            bulges: Bulges::default(),
+            covered: 0.0,
+            tolerated: 0.0,
+            searches: Default::default(),
+            patch: Patch::default(),
+            diverged: None,
+            offending: Vec::new(),
+            moved: f64::INFINITY,
+            scale: 0.0,
+            off: 0.0,
+            residual: 0.0,
+            work: Work::default(),
+        }
+    }
+
+    /// Line tension γ (force).
+    ///
+    /// ```
+    /// assert_eq!(softjam::models::droplet::contact::ContactLaw::default().line_tension(), 1.0);
+    /// ```
+    #[must_use]
+    pub fn line_tension(&self) -> f64 {
+        self.line_tension
+    }
+
+    /// `1/2πγ`.
+    pub(super) fn per_radius(&self) -> f64 {
+        1.0 / (2.0 * PI * self.line_tension)
+    }
+
+    /// Solves `A x = b` with the matrix found last, from the guess in `x`, to `max |A x − b| ≤ tolerance`.
+    ///
+    /// # Errors
+    ///
+    /// [`ContactError::Solver`].
+    ///
+    /// ```
+    /// assert!(softjam::models::droplet::contact::ContactLaw::default().solve_linear(&[], &mut [], 0.0).is_ok());
+    /// ```
+    pub fn solve_linear(
+        &mut self,
+        b: &[f64],
+        x: &mut [f64],
+        tolerance: f64,
+    ) -> Result<(), ContactError> {
+        // `matrix` borrows the whole law.
+        let mut solver = core::mem::replace(&mut self.solver, LinearSolver::new(Method::default()));
+        let solved = solver.solve(self.matrix(), b, x, tolerance);
+        self.solver = solver;
+        solved?;
+        Ok(())
+    }
+
+    /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
+    pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
+        self.take(packing, pairs, forces);
+        (self.refreshed, self.moved) = (false, f64::INFINITY);
+        self.assemble(packing);
+        self.measure_equation();
+        self.inspect(packing);
+    }
+
+    fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
+        self.present.take();
+        if !self.is_in_order() || self.pairs != pairs || !self.neighbors.is_of(packing) {
+            self.pairs.clear();
+            self.pairs.extend_from_slice(pairs);
+            self.at_rest.clear();
+            self.added.clear();
+            self.bulges.forget();
+            (self.structured, self.parted) = (false, false);
+            let set = name_of(pairs);
+            self.sets = (set, set);
+        }
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
+        self.forces.clear();
+        self.forces.extend_from_slice(forces);
+    }
+
+    /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
+    /// of `|A f − δ|` on contacts, of `−gap` elsewhere and of `−f A_cc`.
+    ///
+    /// ```
+    /// assert_eq!(softjam::models::droplet::contact::ContactLaw::default().residual(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn residual(&self) -> f64 {
+        self.residual
+    }
+
+    /// The residual below which the law counts as fulfilled, in the same measure.
+    ///
+    /// Sixteen tolerances: a linear system solved to the tolerance leaves gaps and forces uncertain by about the
+    /// condition number of `A`, some 6 of them.
+    ///
+    /// ```
+    /// let law = softjam::models::droplet::contact::ContactLaw::default();
+    /// assert!(law.residual() <= law.accepted_residual());
+    /// ```
+    #[must_use]
+    pub fn accepted_residual(&self) -> f64 {
+        ACCEPTED * self.tolerance
+    }
+
+    /// What it has cost so far.
+    ///
+    /// ```
+    /// assert_eq!(softjam::models::droplet::contact::ContactLaw::default().work(), Default::default());
+    /// ```
+    #[must_use]
+    pub fn work(&self) -> Work {
+        Work {
+            neighbor_lists: self.neighbors.builds(),
+            symbolic: self.solver.symbolic_factorizations(),
+            values: self.matrix.kept,
+            ..self.work
+        }
+    }
+
+    /// Solves the contact problem at the positions of `packing`, starting from contacts and forces of a step before.
+    ///
+    /// `pairs` ascend, `forces` are in the same order; both may be empty. With [`Rule::Complementarity`] the start
+    /// decides only how fast the answer is found (and its last bits, within the tolerance).
+    ///
+    /// # Errors
+    ///
+    /// [`ContactError`]; the law's last answer is then of no use.
+    ///
+    /// # Panics
+    ///
+    /// If `pairs` names a particle that the packing lacks or the slices differ in length.
+    ///
+    /// See the example of [`ContactLaw`].
+    pub fn solve(
+        &mut self,
+        packing: &Packing,
+        pairs: &[[u32; 2]],
+        forces: &[f64],
+    ) -> Result<(), ContactError> {
+        assert_eq!(pairs.len(), forces.len(), "one force a contact");
+        self.take(packing, pairs, forces);
+        self.solve_within(packing, 0.0, f64::INFINITY)
+    }
+
+    /// [`solve`](Self::solve), starting from the contacts and forces found last.
+    ///
+    /// # Errors
+    ///
+    /// As [`solve`](Self::solve).
+    ///
+    /// ```
+    /// # use softjam::models::droplet::contact::ContactLaw;
+    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
+    /// # let at = |x| Vec2::new(x, 2.0);
+    /// # let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
+    /// let mut law = ContactLaw::default();
+    /// law.solve(&packing, &[], &[]).unwrap();
+    /// let iterations = law.work().iterations;
+    /// law.solve_again(&packing).unwrap();
+    /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
+    /// ```
+    pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
+        if !self.neighbors.is_of(packing) {
+            // Other particles: contacts of the ones before mean nothing.
+            self.take(packing, &[], &[]);
+        }
+        self.solve_within(packing, 0.0, f64::INFINITY)
+    }
+
+    /// [`solve_again`](Self::solve_again) to the tolerance that is due at `f_max` (units of γ). No particle has moved by more
+    /// than `moved` (length) since the solution before.
+    pub(crate) fn solve_within(
+        &mut self,
+        packing: &Packing,
+        f_max: f64,
+        moved: f64,
+    ) -> Result<(), ContactError> {
+        self.present.take();
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
+        self.refreshed = false;
+        self.moved += moved;
+        self.slack = slack(packing, f_max);
+        self.work.solves += 1;
+        match self.rule {
+            Rule::Complementarity => self.settle(packing)?,
+            Rule::Saitoh => {
+                (self.slack, self.precision) = (0.0, Precision::Double);
+                self.sweep(packing)?;
+                self.exchange(packing, self.offending.len());
+                self.sweep(packing)?;
+            }
+        }
+        self.check_answer(packing)
+    }
+
+    /// Solves on at the positions solved last, to the tolerance that is due at `f_max` (units of γ).
+    pub(crate) fn tighten(&mut self, packing: &Packing, f_max: f64) -> Result<(), ContactError> {
+        if self.rule == Rule::Saitoh {
+            // It solves twice and takes what comes.
+            return Ok(());
+        }
+        self.present.take();
+        self.slack = slack(packing, f_max);
+        self.settle(packing)?;
+        self.check_answer(packing)
+    }
+
+    /// The forces of an unfinished exchange can be anything; only an answer is held against the box.
+    fn check_answer(&self, packing: &Packing) -> Result<(), ContactError> {
+        let scale = self.scale();
+        if self.residual * scale <= ACCEPTED * self.allowed(scale) {
+            self.check_images(packing)?;
+        }
+        Ok(())
+    }
+
+    /// The tolerance that is due in a frame whose largest net force is `f_max` (units of γ), with the contacts found last;
+    /// see [`due_tolerance`](super::due_tolerance).
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.law().tolerance_at(run.packing(), 0.0), 1e-12);
+    /// assert!(run.law().tolerance_at(run.packing(), 1e-3) > 1e-8);
+    /// ```
+    #[must_use]
+    pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
+        match self.rule {
+            Rule::Complementarity => {
+                relative_tolerance(self.tolerance, slack(packing, f_max), self.scale())
+            }
+            Rule::Saitoh => self.tolerance,
+        }
+    }
+
+    /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
+    /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
+    pub(super) fn passed_over(&self, scale: f64) -> f64 {
+        let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
+        part * ACCEPTED * self.allowed(scale)
+    }
+
+    /// The residual looked for, as a length; `scale` is the largest `|δ|`.
+    pub(super) fn allowed(&self, scale: f64) -> f64 {
+        scale * relative_tolerance(self.tolerance, self.slack, scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{Domain, Vec2};
+
+    /// Where each buffer is, and how long it may get without moving.
+    fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
+        fn of<T>(v: &Vec<T>) -> (usize, usize) {
+            (v.as_ptr() as usize, v.capacity())
+        }
+        [
+            of(&law.pairs),
+            of(&law.forces),
+            of(&law.others),
+            of(&law.offending),
+            of(&law.at_rest),
+        ]
+    }
+
+    #[test]
+    fn a_solution_with_the_same_contacts_moves_no_buffer() {
+        let side = 6.0;
+        let mut points = Vec::new();
+        for k in 0..36 {
+            points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
+        }
+        let packing = |shift: f64| {
+            let mut points = points.clone();
+            for (k, p) in points.iter_mut().enumerate() {
+                p.x += shift * (k as f64).sqrt();
+            }
+            Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
+        };
+        let mut law = ContactLaw::default();
+        law.solve(&packing(0.0), &[], &[]).unwrap();
+        law.solve_again(&packing(1e-4)).unwrap();
+        let (before, structures) = (buffers(&law), law.work().structures);
+        for k in 2..50 {
+            law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
+        }
+        assert_eq!(law.work().structures, structures, "the same contacts");
+        assert_eq!(buffers(&law), before);
+    }
+}

@@ -1,0 +1,249 @@
+//! What an exchange of a few contacts changes, and nothing else.
+//!
+//! The forces `f` of a contact set are known to a residual `ρ = δ − A f`. If a few contacts go or come, `f` is changed by
+//! their forces, and the residual by what these forces do to the contacts next to them: a right-hand side that is zero but
+//! for a few entries. The correction solves `A Δf = r` for it. After `k` iterations conjugate gradients have reached
+//! contacts at most `k` steps away, so they are run on a patch of contacts that grows by one step an iteration: the
+//! very iterations of the whole system, without the zeros. What is left of `r` adds to `ρ`, and the sum is kept below the
+//! tolerance.
+//!
+//! Each exchange has a patch of its own, and is made on the forces that the ones before have left: in a large packing most lie far
+//! apart, and each needs but the iterations that it asks for. Where patches meet, what they leave is added up.
+//!
+//! Contacts beyond the patch keep their forces, so that none of them begins to pull; the gap of a pair depends on the
+//! forces on its two particles, so that only pairs with a particle of the patch are looked at again.
+
+use super::blocks::compliance;
+use super::bulges::{WIDER, most_of};
+use super::complementarity::{Offence, WIDEST_BULGE};
+use super::geometry::gap_of;
+use super::law::ContactLaw;
+use super::patch::{GONE, NOWHERE, Patch, Whole};
+use crate::models::droplet::kernel::Direction;
+use crate::state::{Packing, unit_and_length};
+
+/// Exchanges that are tried before the whole set is solved again.
+const ROUNDS: usize = 8;
+
+impl ContactLaw {
+    /// Exchanges the offending contacts and mends the forces around them until none offends; says whether it got there.
+    /// If not, the contacts are exchanged all the same, with forces to go on from.
+    pub(super) fn mend(&mut self, packing: &Packing) -> bool {
+        let mut patch = core::mem::take(&mut self.patch);
+        let known = self.pairs.len();
+        patch.place.resize(known, NOWHERE);
+        patch.left_of.resize(known, 0.0);
+        patch.block.resize(packing.len(), NOWHERE);
+        patch.is_visited.resize(packing.len(), false);
+        for &c in &self.at_rest {
+            patch.place[c as usize] = GONE;
+        }
+        let settled = self.mend_in(packing, &mut patch);
+        self.offending.clear();
+        for &c in &patch.gone {
+            self.offending
+                .push(Offence::Drop(c as usize, self.pairs[c as usize]));
+        }
+        for &c in &self.at_rest {
+            if patch.place[c as usize] != GONE {
+                let (pair, force) = (self.pairs[c as usize], self.forces[c as usize]);
+                self.offending.push(Offence::Add(pair, force));
+            }
+            patch.place[c as usize] = NOWHERE;
+        }
+        for (k, pair) in patch.added_pairs().enumerate() {
+            if patch.place[known + k] != GONE {
+                let force = self.forces[known + k];
+                self.offending.push(Offence::Add(pair, force));
+            }
+        }
+        self.offending
+            .sort_unstable_by_key(|offence| offence.pair());
+        self.forces.truncate(known);
+        patch.finish();
+        self.patch = patch;
+        self.exchange(packing, self.offending.len());
+        settled
+    }
+
+    fn mend_in(&mut self, packing: &Packing, patch: &mut Patch) -> bool {
+        let allowed = self.allowed(self.scale());
+        let (before, tolerance) = (self.off, self.passed_over(self.scale()));
+        let per_radius = self.per_radius();
+        for _ in 0..ROUNDS {
+            self.work.patches += 1;
+            patch.begin_round();
+            let offending = core::mem::take(&mut self.offending);
+            for offence in &offending {
+                let Some((contact, change)) = self.change(packing, patch, *offence, tolerance)
+                else {
+                    continue;
+                };
+                patch.clear();
+                let most = self.contact_count() / 4;
+                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+                patch.disturb(whole, contact, change);
+                let descent = patch.descend(whole, &mut self.forces, 0.5 * allowed, most);
+                let Some((iterations, left)) = descent else {
+                    return false;
+                };
+                self.work.patch_iterations += iterations as u64;
+                self.off = self.off.max(before + patch.leave(left));
+                if self.off > 2.0 * allowed {
+                    return false;
+                }
+            }
+            self.offending = offending;
+            if !self.inspect_round(packing, patch, tolerance) {
+                return false;
+            }
+            if self.offending.is_empty() {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Exchanges an offending pair, if it still offends by more than `tolerance` (length); returns its contact and by how much
+    /// the force of that has changed.
+    fn change(
+        &mut self,
+        packing: &Packing,
+        patch: &mut Patch,
+        offence: Offence,
+        tolerance: f64,
+    ) -> Option<(usize, f64)> {
+        match offence {
+            Offence::Drop(contact, _) => {
+                if self.forces[contact] > 0.0 {
+                    return None;
+                }
+                patch.place[contact] = GONE;
+                if contact < self.pairs.len() && !self.is_at_rest(contact) {
+                    patch.gone.push(contact as u32);
+                }
+                let force = core::mem::take(&mut self.forces[contact]);
+                Some((contact, -force))
+            }
+            Offence::Add(pair, _) => {
+                let guess = self.overlap_force(packing, patch, pair, tolerance)?;
+                let per_radius = self.per_radius();
+                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+                let contact = if let Some(contact) = patch.find(whole, pair) {
+                    patch.gone.retain(|&c| c as usize != contact);
+                    patch.place[contact] = NOWHERE;
+                    contact
+                } else {
+                    let [i, j] = pair.map(|p| p as usize);
+                    let (normal, _) = unit_and_length(packing.separation(i, j));
+                    patch.add(pair, Direction::of(-normal));
+                    self.forces.push(0.0);
+                    self.forces.len() - 1
+                };
+                self.forces[contact] = guess;
+                Some((contact, guess))
+            }
+        }
+    }
+
+    /// Lists the pairs that offend around the patches of a round; `false` if the forces diverge.
+    fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
+        let per_radius = self.per_radius();
+        let widest = WIDEST_BULGE * packing.largest_radius();
+        self.offending.clear();
+        let mut largest: f64 = 0.0;
+        for &p in &patch.visited {
+            let mut bulge = 0.0;
+            let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+            for (contact, _) in patch.contacts_of(whole, p) {
+                let f = self.forces[contact];
+                bulge += most_of(f);
+                if f <= 0.0 && patch.place[contact] != GONE {
+                    let pair = patch.pair(whole, contact);
+                    self.offending.push(Offence::Drop(contact, pair));
+                }
+            }
+            bulge *= WIDER * packing.radii()[p as usize] * per_radius;
+            if bulge.is_nan() || bulge > widest {
+                return false;
+            }
+            self.bulges.widen(p as usize, bulge);
+            largest = largest.max(bulge);
+        }
+        if largest > self.covered {
+            self.cover(packing, largest);
+            self.part();
+        }
+        let known = self.pairs.len();
+        let is_near = |pair: [u32; 2]| pair.iter().any(|p| patch.is_visited[*p as usize]);
+        let others = core::mem::take(&mut self.others);
+        for pair in others.iter().copied().filter(|pair| is_near(*pair)) {
+            let came = patch.find_added(pair);
+            if came.is_none_or(|k| patch.place[known + k] == GONE) {
+                self.inspect_pair(packing, patch, pair, tolerance);
+            }
+        }
+        self.others = others;
+        let at_rest = core::mem::take(&mut self.at_rest);
+        for &c in &at_rest {
+            let pair = self.pairs[c as usize];
+            if patch.place[c as usize] == GONE && is_near(pair) {
+                self.inspect_pair(packing, patch, pair, tolerance);
+            }
+        }
+        self.at_rest = at_rest;
+        for &c in &patch.gone {
+            self.inspect_pair(packing, patch, self.pairs[c as usize], tolerance);
+        }
+        // A contact between two particles that were visited was met twice.
+        self.offending
+            .sort_unstable_by_key(|offence| offence.pair());
+        self.offending.dedup_by_key(|offence| offence.pair());
+        true
+    }
+
+    /// Whether contact `c` was at rest before the exchanges that are being mended.
+    fn is_at_rest(&self, c: usize) -> bool {
+        self.matrix.scaling()[c] == 0.0
+    }
+
+    fn inspect_pair(&mut self, packing: &Packing, patch: &Patch, pair: [u32; 2], tolerance: f64) {
+        let [i, j] = pair.map(|p| p as usize);
+        let radii = packing.radii();
+        let separation = packing.separation(i, j);
+        let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
+        self.work.distances += 1;
+        if separation.norm_squared() >= reach * reach {
+            return;
+        }
+        if let Some(guess) = self.overlap_force(packing, patch, pair, tolerance) {
+            self.offending.push(Offence::Add(pair, guess));
+        }
+    }
+
+    /// A first guess of the force of a pair without one whose contours overlap by more than `tolerance` (length).
+    fn overlap_force(
+        &mut self,
+        packing: &Packing,
+        patch: &Patch,
+        pair: [u32; 2],
+        tolerance: f64,
+    ) -> Option<f64> {
+        let [i, j] = pair.map(|p| p as usize);
+        let per_radius = self.per_radius();
+        let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+        self.work.gaps += 1;
+        let forces = &self.forces;
+        let gap = gap_of(packing, self.line_tension, [i, j], |p| {
+            let contacts = patch.contacts_of(whole, p as u32);
+            contacts.map(|(contact, toward)| (forces[contact], toward))
+        });
+        if gap < -tolerance {
+            let sum = packing.radii()[i] + packing.radii()[j];
+            Some(-gap / compliance(per_radius, sum))
+        } else {
+            self.tolerated = self.tolerated.max(-gap);
+            None
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! The contacts as they are seen from outside: in the order of pairs, and no other among them. And what can be read off them in
+//! the order of their numbers, with the same bits.
+
+use super::law::ContactLaw;
+use super::list::ContactList;
+use super::matrix::{ContactMatrix, Geometry};
+use crate::contacts::net_forces;
+use crate::contacts::{Contacts, FrameContacts};
+use crate::domain::Vec2;
+use core::ops::Range;
+use std::sync::OnceLock;
+
+impl ContactLaw {
+    /// The contacts and forces found last.
+    ///
+    /// ```
+    /// assert!(softjam::models::droplet::contact::ContactLaw::default().contacts().forces.is_empty());
+    /// ```
+    #[must_use]
+    pub fn contacts(&self) -> Contacts<'_> {
+        if self.is_in_order() {
+            self.numbered()
+        } else {
+            self.present().contacts()
+        }
+    }
+
+    /// Pairs and forces of [`contacts`](Self::contacts), copied to where others were.
+    pub(crate) fn copy_contacts(&self, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        pairs.clear();
+        forces.clear();
+        pairs.reserve(self.contact_count());
+        forces.reserve(self.contact_count());
+        for stretch in self.in_order() {
+            pairs.extend_from_slice(&self.pairs[stretch.clone()]);
+            forces.extend_from_slice(&self.forces[stretch]);
+        }
+    }
+
+    /// The contacts that are not at rest in the order of pairs, as stretches of their numbers.
+    fn in_order(&self) -> Vec<Range<usize>> {
+        let sorted = self.pairs.len() - self.added.len();
+        let (mut gone, mut late) = (self.at_rest.clone(), Vec::new());
+        gone.sort_unstable();
+        // Before which of the sorted ones a later one belongs.
+        for c in sorted..self.pairs.len() {
+            if gone.binary_search(&(c as u32)).is_err() {
+                let before = self.pairs[..sorted].partition_point(|pair| *pair < self.pairs[c]);
+                late.push((before, self.pairs[c], c));
+            }
+        }
+        late.sort_unstable();
+        let (mut stretches, mut from) = (Vec::new(), 0);
+        let mut late = late.into_iter().peekable();
+        let ends = gone.into_iter().map(|c| c as usize);
+        for end in ends.take_while(|c| *c < sorted).chain([sorted]) {
+            while let Some((before, _, c)) = late.next_if(|(before, ..)| *before <= end) {
+                stretches.extend([from..before, c..c + 1]);
+                from = before;
+            }
+            stretches.push(from..end);
+            from = end + 1;
+        }
+        stretches
+    }
+
+    /// The contacts in the order of their numbers, those at rest among them with no force.
+    pub(crate) fn numbered(&self) -> Contacts<'_> {
+        Contacts {
+            pairs: &self.pairs,
+            normals: self.geometry.normals(),
+            distances: self.geometry.distances(),
+            overlaps: self.geometry.overlaps(),
+            forces: &self.forces,
+        }
+    }
+
+    /// The matrix `A` of the contacts found last.
+    ///
+    /// ```
+    /// assert!(softjam::models::droplet::contact::ContactLaw::default().matrix().is_empty());
+    /// ```
+    #[must_use]
+    pub fn matrix(&self) -> &ContactMatrix {
+        if self.is_in_order() && self.matrix.is_complete() {
+            &self.matrix
+        } else {
+            self.present().matrix(&self.matrix, &self.geometry)
+        }
+    }
+
+    /// The net force on each particle into `net`, `F_i = Σ_j f_ij n_ij` (force), summed in the order of its partners: the bits
+    /// of [`net_forces`] with [`contacts`](Self::contacts).
+    pub(crate) fn sum_forces(&self, net: &mut [Vec2]) {
+        let numbered = self.numbered();
+        net_forces(&numbered, net);
+        // A contact that came late is at the end of the numbers, and not in its place.
+        for &p in self.added.as_flattened() {
+            let duplicate = self.geometry.duplicate();
+            let partners = duplicate.partners(p as usize).iter();
+            let mut sum = Vec2::zeros();
+            for (&q, &c) in partners.zip(duplicate.contacts(p as usize)) {
+                let force = numbered.normals[c as usize] * numbered.forces[c as usize];
+                sum += if p < q { force } else { -force };
+            }
+            net[p as usize] = sum;
+        }
+    }
+
+    /// What came (`true`) and went in the last solution, one after the other.
+    pub(crate) fn changes(&self) -> &[([u32; 2], bool)] {
+        &self.changes
+    }
+
+    /// What the set of contacts was called before the last solution and is called now: the same set has the same name, and
+    /// another has another but for one in 2⁶⁴.
+    pub(crate) fn sets(&self) -> (u64, u64) {
+        self.sets
+    }
+
+    /// Takes note of a contact that comes or goes.
+    pub(super) fn note(&mut self, pair: [u32; 2], came: bool) {
+        self.changes.push((pair, came));
+        self.sets.1 ^= name(pair);
+    }
+
+    /// Number of contacts.
+    pub(crate) fn contact_count(&self) -> usize {
+        self.pairs.len() - self.at_rest.len()
+    }
+
+    /// Whether the numbers of the contacts are their places in the order of pairs, and all are in contact.
+    pub(super) fn is_in_order(&self) -> bool {
+        self.at_rest.is_empty() && self.added.is_empty()
+    }
+
+    pub(super) fn present(&self) -> &Present {
+        self.present
+            .get_or_init(|| Present::of(&self.numbered(), &self.in_order(), &self.matrix))
+    }
+}
+
+/// The contacts that are not at rest, in the order of pairs.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Present {
+    /// Their numbers.
+    order: Vec<u32>,
+    contacts: FrameContacts,
+    particles: usize,
+    matrix: OnceLock<ContactMatrix>,
+}
+
+impl Present {
+    /// Those `stretches` of `numbered`, the contacts of `matrix`.
+    fn of(numbered: &Contacts<'_>, stretches: &[Range<usize>], matrix: &ContactMatrix) -> Self {
+        let order = stretches.iter().cloned().flatten();
+        Self {
+            contacts: FrameContacts::picked(numbered, stretches),
+            particles: matrix.particles(),
+            order: order.map(|c| c as u32).collect(),
+            matrix: OnceLock::new(),
+        }
+    }
+
+    pub(super) fn contacts(&self) -> Contacts<'_> {
+        self.contacts.view()
+    }
+
+    /// The matrix of these contacts; `whole` is that of all numbers, and `geometry` theirs.
+    pub(super) fn matrix(&self, whole: &ContactMatrix, geometry: &Geometry) -> &ContactMatrix {
+        self.matrix.get_or_init(|| {
+            let mut list = ContactList::default();
+            list.rebuild(self.particles, self.contacts.view().pairs);
+            let geometry = geometry.of_some(&self.order, &list);
+            whole.of_some(&self.order, &list, &geometry)
+        })
+    }
+}
+
+/// The name of a set of contacts; see [`ContactLaw::sets`].
+pub(super) fn name_of(pairs: &[[u32; 2]]) -> u64 {
+    pairs.iter().fold(0, |set, pair| set ^ name(*pair))
+}
+
+/// A pair's part in the name of a set of contacts: the finalizer of SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA
+/// 2014).
+fn name([i, j]: [u32; 2]) -> u64 {
+    let mut x = (u64::from(i) << 32 | u64::from(j)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
+}

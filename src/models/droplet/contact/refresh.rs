@@ -1,0 +1,466 @@
+//! The entries of [`ContactMatrix`] at new positions, and its products, by one thread or by two.
+
+use super::blocks::Run;
+use super::fill::{Blocks, fill, fill_blocks};
+use super::geometry::{Directions, Geometry, Part};
+use super::matrix::{ContactMatrix, Precision, Units};
+use super::product::{FirstProducts, Number, Products};
+use super::sight::{Lanes, Sight, SingleBlocks, fill_single, fill_single_blocks};
+use crate::domain::Vec2;
+use crate::models::droplet::kernel::Direction;
+use crate::numerics::threads::{are_two_for, both};
+use crate::numerics::wide::wide;
+use crate::state::Packing;
+use core::ops::Range;
+
+/// Room for what is computed of a run and not kept.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Room {
+    toward: Vec<Direction>,
+    values: Vec<f64>,
+    lanes: Vec<Lanes>,
+}
+
+/// What blocks are made from.
+#[derive(Clone, Copy)]
+struct Layout<'a> {
+    runs: &'a [Run],
+    particle: &'a [u32],
+    end: &'a [u32],
+    scale: &'a [f64],
+    scaling: &'a [f64],
+    sights: &'a [Sight],
+    loads: &'a [f32],
+    units: Units,
+}
+
+/// Where the entries of blocks go, the first of all being number `first` of the matrix; the values themselves only where they are
+/// to be kept.
+struct Filled<'a> {
+    first: usize,
+    value: Option<&'a mut [f64]>,
+    scaled: &'a mut [f32],
+    room: &'a mut Room,
+}
+
+/// The precision that entries are computed in, and the column for their products with the forces.
+enum Column<'a> {
+    Double(&'a mut [f64]),
+    Single(&'a mut [f32]),
+}
+
+impl ContactMatrix {
+    /// Directions and scaled values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
+    /// [`products_into`](Self::products_into) has it; entries and products in this `precision`. The pairs are the contacts by number,
+    /// those of `geometry`. Returns the largest `|δ|` (length).
+    pub(crate) fn refresh(
+        &mut self,
+        geometry: &mut Geometry,
+        at: (&Packing, &[[u32; 2]], &[f64]),
+        products: &mut FirstProducts,
+        precision: Precision,
+    ) -> f64 {
+        self.lacks_values = precision == Precision::Single || !self.keeps_values;
+        self.kept += u64::from(self.is_complete());
+        let n = self.len();
+        match (precision, self.is_for_two()) {
+            (Precision::Single, false) => {
+                let column = Column::Single(products.single.alone(n));
+                self.refresh_by_one(geometry, at, column)
+            }
+            (Precision::Double, false) => {
+                let column = Column::Double(products.double.alone(n));
+                self.refresh_by_one(geometry, at, column)
+            }
+            (Precision::Single, true) => {
+                let columns = products.single.both(n).map(Column::Single);
+                let largest = self.refresh_by_two(geometry, at, columns);
+                products.single.add_up();
+                largest
+            }
+            (Precision::Double, true) => {
+                let columns = products.double.both(n).map(Column::Double);
+                let largest = self.refresh_by_two(geometry, at, columns);
+                products.double.add_up();
+                largest
+            }
+        }
+    }
+
+    /// The entries in single precision of the directions of `geometry`, and their products with `forces`.
+    pub(crate) fn fill_in_single(
+        &mut self,
+        geometry: &Geometry,
+        forces: &[f64],
+        products: &mut FirstProducts,
+    ) {
+        let (contacts, runs) = (self.len(), self.runs.len());
+        let mut column = Column::Single(products.single.alone(contacts));
+        wide(
+            #[inline(always)]
+            || {
+                self.look(geometry, forces, 0..contacts);
+                self.fill((geometry.directions(), forces), 0..runs, &mut column, false);
+            },
+        );
+        self.lacks_values = true;
+    }
+
+    /// Values and scaled values of the directions of `geometry`, where they are not there.
+    pub(crate) fn complete(&mut self, geometry: &Geometry) {
+        if self.is_complete() {
+            return;
+        }
+        let zeros = vec![0.0; self.len()];
+        let mut products = vec![0.0; self.len()];
+        let column = &mut Column::Double(&mut products);
+        let all = 0..self.runs.len();
+        wide(
+            #[inline(always)]
+            || self.fill((geometry.directions(), &zeros), all, column, true),
+        );
+        self.lacks_values = false;
+        self.kept += 1;
+    }
+
+    /// Whether all values are of the present positions and contacts.
+    pub(crate) fn is_complete(&self) -> bool {
+        !self.lacks_values
+    }
+
+    /// [`add_products`](Self::add_products) to zeros, by two threads if there are two.
+    pub(crate) fn products_into<F: Number>(&self, values: &[F], x: &[F], y: &mut Products<F>) {
+        let all = self.runs.len();
+        let part = |runs: Range<usize>, y: &mut [F]| {
+            wide(
+                #[inline(always)]
+                || self.add_products(values, runs, x, y),
+            );
+        };
+        if self.is_for_two() {
+            let middle = self.middle();
+            let [one, other] = y.both(self.len());
+            both(true, || part(0..middle, one), || part(middle..all, other));
+            y.add_up();
+        } else {
+            part(0..all, y.alone(self.len()));
+        }
+    }
+
+    /// Whether there are two threads, and work for both.
+    pub(super) fn is_for_two(&self) -> bool {
+        are_two_for(self.len())
+    }
+
+    /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
+    /// those of its own stretch or of one before.
+    fn refresh_by_one(
+        &mut self,
+        geometry: &mut Geometry,
+        (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
+        mut column: Column<'_>,
+    ) -> f64 {
+        let (sorted, keep) = (self.sorted_contacts(), self.keeps_values);
+        let in_single = matches!(column, Column::Single(_));
+        let stretches = core::mem::take(&mut self.stretches);
+        let largest = wide(
+            #[inline(always)]
+            || {
+                let mut largest: f64 = 0.0;
+                let [mut run, mut contact] = [0; 2];
+                let late = ([0; 2], sorted..pairs.len());
+                let ends = stretches.iter().map(|&[runs, contacts]| {
+                    let own = core::mem::replace(&mut contact, contacts)..contacts;
+                    ([core::mem::replace(&mut run, runs), runs], own)
+                });
+                for (runs, own) in core::iter::once(late).chain(ends) {
+                    let part = geometry.part(own.clone());
+                    part.refresh(packing, &pairs[own.clone()]);
+                    largest = largest.max(self.largest_overlap(geometry, own.clone()));
+                    if in_single {
+                        self.look(geometry, forces, own);
+                    }
+                    let at = (geometry.directions(), forces);
+                    self.fill(at, runs[0]..runs[1], &mut column, keep);
+                }
+                let all = self.runs.len();
+                let at = (geometry.directions(), forces);
+                self.fill(at, self.sorted..all, &mut column, keep);
+                largest
+            },
+        );
+        self.stretches = stretches;
+        largest
+    }
+
+    /// What single precision knows of some contacts.
+    #[inline(always)]
+    fn look(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
+        let seen = Seen {
+            sights: &mut self.sights[contacts.clone()],
+            loads: &mut self.loads[contacts.clone()],
+        };
+        let of = [&self.diagonal[..], &self.scaling, forces];
+        seen.look(geometry.directions(), of, contacts, self.units);
+    }
+
+    /// [`look`](Self::look) at all contacts, the first `half` of them and the others.
+    fn look_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
+        let (of, units) = ([&self.diagonal[..], &self.scaling, forces], self.units);
+        let (sights, more_sights) = self.sights.split_at_mut(half);
+        let (loads, more_loads) = self.loads.split_at_mut(half);
+        let look = |seen: Seen<'_>, contacts: Range<usize>| {
+            wide(
+                #[inline(always)]
+                || seen.look(geometry.directions(), of, contacts, units),
+            );
+        };
+        let one = Seen { sights, loads };
+        let other = Seen {
+            sights: more_sights,
+            loads: more_loads,
+        };
+        let all = of[0].len();
+        both(true, || look(one, 0..half), || look(other, half..all));
+    }
+
+    /// Half of the directions each, then half of the entries each.
+    fn refresh_by_two(
+        &mut self,
+        geometry: &mut Geometry,
+        (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
+        [mut column, mut more]: [Column<'_>; 2],
+    ) -> f64 {
+        let refresh = |part: Part<'_>, pairs: &[[u32; 2]]| {
+            wide(
+                #[inline(always)]
+                || part.refresh(packing, pairs),
+            );
+        };
+        let half = pairs.len() / 2;
+        let [one, other] = geometry.halves(half);
+        both(
+            true,
+            || refresh(one, &pairs[..half]),
+            || refresh(other, &pairs[half..]),
+        );
+        let (middle, all, length) = (self.middle(), self.runs.len(), self.len());
+        if matches!(column, Column::Single(_)) {
+            self.look_by_two(geometry, forces, half);
+        }
+        let keep = self.keeps_values;
+        let (layout, [mut one, mut other]) = self.halves(middle, keep);
+        let fill = |runs: Range<usize>, out: &mut Filled<'_>, column: &mut Column<'_>| {
+            wide(
+                #[inline(always)]
+                || layout.fill((geometry.directions(), forces), runs, out, column),
+            );
+        };
+        both(
+            true,
+            || fill(0..middle, &mut one, &mut column),
+            || fill(middle..all, &mut other, &mut more),
+        );
+        wide(
+            #[inline(always)]
+            || self.largest_overlap(geometry, 0..length),
+        )
+    }
+
+    /// The run with which the second half of the entries begins.
+    fn middle(&self) -> usize {
+        let half = self.scaled.len() / 2;
+        self.runs.partition_point(|run| run.value < half)
+    }
+
+    /// What the blocks are made from, and where they go: those of the first `middle` runs, and the others.
+    fn halves(&mut self, middle: usize, keep: bool) -> (Layout<'_>, [Filled<'_>; 2]) {
+        let all = self.scaled.len();
+        let first = self.runs.get(middle).map_or(all, |run| run.value);
+        let layout = Layout {
+            runs: &self.runs,
+            particle: &self.particle,
+            end: &self.end,
+            scale: &self.scale,
+            scaling: &self.scaling,
+            sights: &self.sights,
+            loads: &self.loads,
+            units: self.units,
+        };
+        let (scaled, more_scaled) = self.scaled.split_at_mut(first);
+        let (value, more_values) = keep.then(|| self.value.split_at_mut(first)).unzip();
+        let [room, more_room] = &mut self.rooms;
+        let one = Filled {
+            first: 0,
+            value,
+            scaled,
+            room,
+        };
+        let other = Filled {
+            first,
+            value: more_values,
+            scaled: more_scaled,
+            room: more_room,
+        };
+        (layout, [one, other])
+    }
+
+    /// The values of some runs, scaled and not, and their products with the forces.
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        at: (Directions<'_>, &[f64]),
+        runs: Range<usize>,
+        column: &mut Column<'_>,
+        keep: bool,
+    ) {
+        let all = self.runs.len();
+        let (layout, [mut all, _]) = self.halves(all, keep);
+        layout.fill(at, runs, &mut all, column);
+    }
+
+    /// The largest `|δ|` (length) of some contacts, leaving out those at rest.
+    #[inline(always)]
+    pub(crate) fn largest_overlap(&self, geometry: &Geometry, contacts: Range<usize>) -> f64 {
+        let larger = |m: f64, x: f64| if x > m { x } else { m };
+        let in_contact = |d: f64, s: f64| if s > 0.0 { d.abs() } else { 0.0 };
+        let (d8, d_rest) = geometry.overlaps()[contacts.clone()].as_chunks::<8>();
+        let (s8, s_rest) = self.scaling[contacts].as_chunks::<8>();
+        let mut largest = [0.0; 8];
+        for (d, s) in d8.iter().zip(s8) {
+            for k in 0..8 {
+                largest[k] = larger(largest[k], in_contact(d[k], s[k]));
+            }
+        }
+        let rest = d_rest.iter().zip(s_rest).map(|(d, s)| in_contact(*d, *s));
+        rest.chain(largest).fold(0.0, larger)
+    }
+}
+
+/// Columns of what single precision knows of some contacts.
+struct Seen<'a> {
+    sights: &'a mut [Sight],
+    loads: &'a mut [f32],
+}
+
+impl Seen<'_> {
+    /// From the directions of the `contacts`, and the columns of diagonal, scaling and forces of all.
+    #[inline(always)]
+    fn look(
+        self,
+        Directions { normals, angles }: Directions<'_>,
+        of: [&[f64]; 3],
+        contacts: Range<usize>,
+        units: Units,
+    ) {
+        let [diagonal, scaling, forces] = of.map(
+            #[inline(always)]
+            |column| &column[contacts.clone()],
+        );
+        let inverse = 1.0 / units.load;
+        let columns = self.loads.iter_mut().zip(diagonal);
+        for ((load, a), (s, f)) in columns.zip(scaling.iter().zip(forces)) {
+            *load = (f * (a * s * inverse)) as f32;
+        }
+        let directions = normals[contacts.clone()].iter().zip(&angles[contacts]);
+        for ((sight, s), (n, angle)) in self.sights.iter_mut().zip(scaling).zip(directions) {
+            *sight = Sight::of((-n.x, -n.y), *angle, s * units.root);
+        }
+    }
+}
+
+impl Layout<'_> {
+    /// The entries of some runs, and their products with the forces.
+    #[inline(always)]
+    fn fill(
+        self,
+        at: (Directions<'_>, &[f64]),
+        runs: Range<usize>,
+        out: &mut Filled<'_>,
+        column: &mut Column<'_>,
+    ) {
+        match column {
+            Column::Double(products) => self.fill_in_double(at, runs, out, products),
+            Column::Single(products) => self.fill_in_single(runs, out, products),
+        }
+    }
+
+    #[inline(always)]
+    fn fill_in_double(
+        self,
+        (directions, forces): (Directions<'_>, &[f64]),
+        runs: Range<usize>,
+        out: &mut Filled<'_>,
+        products: &mut [f64],
+    ) {
+        let Room { toward, values, .. } = &mut *out.room;
+        for run in &self.runs[runs] {
+            let ends = &self.end[run.ends()];
+            // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
+            if toward.len() < ends.len() {
+                toward.resize(ends.len(), Direction::of(Vec2::x()));
+            }
+            for (toward, end) in toward.iter_mut().zip(ends) {
+                *toward = directions.toward(*end);
+            }
+            let own = run.values().start - out.first..run.values().end - out.first;
+            if values.len() < own.len() {
+                values.resize(own.len(), 0.0);
+            }
+            let blocks = Blocks {
+                toward,
+                ends,
+                values: match &mut out.value {
+                    Some(value) => &mut value[own.clone()],
+                    None => &mut values[..own.len()],
+                },
+                scaled: &mut out.scaled[own],
+                scaling: self.scaling,
+                forces,
+                products,
+            };
+            let particles = &self.particle[run.block..run.block + run.count];
+            let scales = particles.iter().map(|p| self.scale[*p as usize]);
+            match run.size {
+                1 => {}
+                2 => fill::<2, 1>(blocks, scales),
+                3 => fill::<3, 3>(blocks, scales),
+                4 => fill::<4, 6>(blocks, scales),
+                5 => fill::<5, 10>(blocks, scales),
+                6 => fill::<6, 15>(blocks, scales),
+                7 => fill::<7, 21>(blocks, scales),
+                z => fill_blocks(z, blocks, scales),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn fill_in_single(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
+        let per_radius = 1.0 / (self.units.root * self.units.root);
+        for run in &self.runs[runs] {
+            let own = run.values().start - out.first..run.values().end - out.first;
+            let blocks = SingleBlocks {
+                ends: &self.end[run.ends()],
+                sights: self.sights,
+                loads: self.loads,
+                scaled: &mut out.scaled[own],
+                products,
+                room: &mut out.room.lanes,
+            };
+            let particles = &self.particle[run.block..run.block + run.count];
+            let radii = particles
+                .iter()
+                .map(|p| (self.scale[*p as usize] * per_radius) as f32);
+            match run.size {
+                1 => {}
+                2 => fill_single::<2, 1>(blocks, radii),
+                3 => fill_single::<3, 3>(blocks, radii),
+                4 => fill_single::<4, 6>(blocks, radii),
+                5 => fill_single::<5, 10>(blocks, radii),
+                6 => fill_single::<6, 15>(blocks, radii),
+                7 => fill_single::<7, 21>(blocks, radii),
+                z => fill_single_blocks(z, blocks, radii),
+            }
+        }
+    }
+}

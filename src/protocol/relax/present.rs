@@ -1,0 +1,170 @@
+//! What a run is at its present frame.
+
+use super::Relaxation;
+use crate::analysis::{Backbone, Observables};
+use crate::contacts::Contacts;
+use crate::domain::Vec2;
+use crate::models::disks::DiskReport;
+use crate::models::droplet::contact::ContactLaw;
+use crate::state::Frame;
+use crate::state::Packing;
+
+impl Relaxation {
+    /// This frame, as a value of its own.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.frame().positions, run.packing().positions());
+    /// ```
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        let mut frame = Frame::default();
+        self.copy_frame(&mut frame);
+        frame
+    }
+
+    /// [`frame`](Self::frame) in the place of another, whose memory it takes.
+    ///
+    /// ```
+    /// # use softjam::{state::Frame, protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// let mut frame = Frame::default();
+    /// run.copy_frame(&mut frame);
+    /// assert_eq!(frame, run.frame());
+    /// ```
+    pub fn copy_frame(&self, frame: &mut Frame) {
+        frame.step = self.step;
+        self.packing.positions().clone_into(&mut frame.positions);
+        self.velocities.clone_into(&mut frame.velocities);
+        self.law
+            .copy_contacts(&mut frame.contacts, &mut frame.forces);
+        frame.minimizer = self.state;
+    }
+
+    /// The packing as it stands.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.packing().len(), 32);
+    /// ```
+    #[must_use]
+    pub fn packing(&self) -> &Packing {
+        &self.packing
+    }
+
+    /// The contacts and forces at this frame.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.contacts().forces.iter().all(|f| *f > 0.0));
+    /// ```
+    #[must_use]
+    pub fn contacts(&self) -> Contacts<'_> {
+        self.law.contacts()
+    }
+
+    /// The net forces `F_i`, one a particle (force; `line_tension` is in the same unit).
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// let total: softjam::domain::Vec2 = run.net_forces().iter().sum();
+    /// assert!(total.norm() < 1e-14);
+    /// ```
+    #[must_use]
+    pub fn net_forces(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    /// Number of moves made.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.step(), 0);
+    /// ```
+    #[must_use]
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Simulated time, the sum of the time steps.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.time(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// The largest net force `f_max` (units of γ).
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert_eq!(run.f_max(), run.observables().f_max);
+    /// ```
+    #[must_use]
+    pub fn f_max(&self) -> f64 {
+        self.f_max
+    }
+
+    /// Balance, energy, stress and coordination at this frame.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.observables().energy > 0.0);
+    /// ```
+    #[must_use]
+    pub fn observables(&self) -> Observables {
+        self.observables_counted(&mut Backbone::default())
+    }
+
+    /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
+    ///
+    /// See the example of [`Backbone`].
+    pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
+        let f_max_and_dt = (self.f_max, self.state.dt);
+        let o = Observables::of_law(&self.law, &self.packing, f_max_and_dt, backbone);
+        if self.form.torques().is_empty() {
+            return o;
+        }
+        o.with_torques(
+            &self.law.contacts(),
+            self.packing.domain(),
+            self.law.line_tension(),
+            self.form.torques(),
+        )
+    }
+
+    /// The contact law with its residual and its count of work.
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.law().residual() <= run.law().accepted_residual());
+    /// ```
+    #[must_use]
+    pub fn law(&self) -> &ContactLaw {
+        &self.law
+    }
+
+    /// How the undeformed disks relaxed; `None` where there was no such stage (a start from a file, a resumed run).
+    ///
+    /// ```
+    /// # use softjam::{protocol::Relaxation, scene::Scene};
+    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
+    /// assert!(run.disks().unwrap().converged);
+    /// ```
+    #[must_use]
+    pub fn disks(&self) -> Option<DiskReport> {
+        self.disks
+    }
+}

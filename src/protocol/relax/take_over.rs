@@ -1,0 +1,42 @@
+//! A run that goes on under another scene.
+
+use super::{RelaxError, Relaxation};
+use crate::scene::Scene;
+use crate::state::Frame;
+use crate::state::Packing;
+
+impl Relaxation {
+    /// Goes on under `scene` from a frame of a run of another, which differs in its threshold, its minimiser or its form of the forces
+    /// alone.
+    ///
+    /// The frame becomes what `scene` computes from it: its contact problem is solved on, where `scene` asks for more at the `f_max` of
+    /// its own forces. From there on [`resume`](Self::resume) walks the same bits.
+    ///
+    /// # Errors
+    ///
+    /// As [`resume`](Self::resume), and [`RelaxError::Contact`] if the contact problem cannot be solved.
+    ///
+    /// ```
+    /// use softjam::{protocol::{Relaxation, Status}, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
+    /// let mut run = Relaxation::new(&scene).unwrap();
+    /// while run.f_max() > 1e-4 {
+    ///     run.advance().unwrap();
+    /// }
+    /// let rough = Scene { threshold: 1e-3, ..scene };
+    /// let run = Relaxation::take_over(&rough, run.packing().clone(), run.frame()).unwrap();
+    /// assert_eq!(run.status(), Status::Converged);
+    /// ```
+    pub fn take_over(scene: &Scene, packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
+        let step = frame.step;
+        let mut run = Self::resume(scene, packing, frame)?;
+        if run.law.residual() > run.promised_residual() {
+            run.law
+                .solve_within(&run.packing, 0.0, f64::INFINITY)
+                .map_err(|source| RelaxError::Contact { step, source })?;
+            run.balance();
+        }
+        Ok(run)
+    }
+}

@@ -1,0 +1,7 @@
+//! The state of a run: a packing (radii, box, positions) and the frame that the next one follows from.
+
+mod frame;
+mod packing;
+
+pub use frame::{Frame, FrameError};
+pub use packing::*;
