@@ -12,12 +12,12 @@
 )]
 
 use softjam::analysis::Backbone;
-use softjam::models::disks;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
 use softjam::models::droplet::contour::{ContourStyle, Contours};
 use softjam::neighbors::NeighborList;
+use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
 use softjam::state::Packing;
@@ -110,7 +110,7 @@ fn stages(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
             threshold,
             ..scene.disks
         };
-        let report = disks::relax(&mut packing, &parameters, 1.0);
+        let report = relax_disks(&mut packing, &parameters, 1.0).unwrap();
         (clock.elapsed().as_secs_f64(), report.steps)
     };
     let (enough, far) = (relax(scene.disks.threshold), relax(1e-12));
@@ -146,7 +146,7 @@ fn steps(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
     while run.f_max() > 1e-3 {
         run.advance()?;
     }
-    let before = run.law().work();
+    let before = run.law().unwrap().work();
     let first = run.step();
     let (mut frames, mut tolerances, mut times): (Vec<Packing>, Vec<f64>, Vec<f64>) =
         Default::default();
@@ -155,17 +155,17 @@ fn steps(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
         run.advance()?;
         times.push(clock.elapsed().as_secs_f64());
         frames.push(run.packing().clone());
-        tolerances.push(run.law().tolerance_at(run.packing(), run.f_max()));
+        tolerances.push(run.law().unwrap().tolerance_at(run.packing(), run.f_max()));
     }
     times.sort_by(f64::total_cmp);
     let step = times[50];
     tolerances.sort_by(f64::total_cmp);
     let due = tolerances[50];
-    let work = run.law().work();
+    let work = run.law().unwrap().work();
     let steps = (run.step() - first) as f64;
     let per_step = |a: u64, b: u64| (a - b) as f64 / steps;
     // Each stands for two places.
-    let entries = run.law().matrix().off_diagonals() as f64 / 2.0;
+    let entries = run.law().unwrap().matrix().off_diagonals() as f64 / 2.0;
 
     let through = |method: Method, tolerance: f64| -> Result<(f64, f64), Box<dyn Error>> {
         let mut law = ContactLaw::new(Rule::Complementarity, method, 1.0, tolerance);

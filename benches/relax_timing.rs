@@ -13,7 +13,7 @@
 )]
 
 use softjam::analysis::Stability;
-use softjam::models::disks;
+use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
 use softjam::state::Packing;
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let clock = Instant::now();
-    let disks = disks::relax(&mut packing, &scene.disks, scene.line_tension);
+    let disks = relax_disks(&mut packing, &scene.disks, scene.line_tension).unwrap();
     let disks_s = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         std::fs::write(folder.join("contacts.txt"), text)?;
     }
-    let work = run.law().work();
+    let work = run.law().unwrap().work();
     println!(
         "{{\"particles\": {}, \"phi\": {}, \"seed\": {}, \"converged\": {}, \"f_max\": {:e}, \"residual\": {:e}, \
          \"disks_s\": {disks_s:.6}, \"disks_steps\": {}, \"first_s\": {first_s:.6}, \"steps_s\": {steps_s:.6}, \
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         scene.seed,
         run.status() == Status::Converged,
         run.f_max(),
-        run.law().residual(),
+        run.law().unwrap().residual(),
         disks.steps,
         run.step(),
         work.solves,

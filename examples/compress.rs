@@ -72,7 +72,7 @@ fn picture(run: &Relaxation) -> String {
         packing.radii(),
         packing.positions(),
         &run.contacts(),
-        run.law().line_tension(),
+        run.law().unwrap().line_tension(),
     );
     let l = packing.domain().lengths() * pixels;
     let mut svg = format!(

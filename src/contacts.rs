@@ -70,22 +70,42 @@ impl FrameContacts {
     #[must_use]
     pub fn of(packing: &Packing, frame: &Frame) -> Self {
         let mut contacts = Self {
-            pairs: frame.contacts.clone(),
             forces: frame.forces.clone(),
             ..Self::default()
         };
-        let domain = packing.domain();
-        for &[i, j] in &frame.contacts {
-            let (i, j) = (i as usize, j as usize);
-            let separation = domain.minimum_image(frame.positions[i] - frame.positions[j]);
-            let (normal, distance) = unit_and_length(separation);
-            contacts.normals.push(normal);
-            contacts.distances.push(distance);
-            contacts
-                .overlaps
-                .push(packing.radii()[i] + packing.radii()[j] - distance);
+        for pair in &frame.contacts {
+            let (normal, distance) = unit_and_length(between(packing, &frame.positions, *pair));
+            contacts.push(packing, *pair, normal, distance);
         }
         contacts
+    }
+
+    /// Those of `pairs` that overlap, with the force that `force` makes of the sum of their radii and their overlap (lengths).
+    pub(crate) fn touching(
+        packing: &Packing,
+        pairs: &[[u32; 2]],
+        force: impl Fn(f64, f64) -> f64,
+    ) -> Self {
+        let mut contacts = Self::default();
+        for pair in pairs {
+            let (normal, distance) = unit_and_length(between(packing, packing.positions(), *pair));
+            let [i, j] = pair.map(|p| packing.radii()[p as usize]);
+            let sum = i + j;
+            if sum > distance {
+                contacts.push(packing, *pair, normal, distance);
+                contacts.forces.push(force(sum, sum - distance));
+            }
+        }
+        contacts
+    }
+
+    /// Adds a contact but for its force.
+    fn push(&mut self, packing: &Packing, pair: [u32; 2], normal: Vec2, distance: f64) {
+        let [i, j] = pair.map(|p| packing.radii()[p as usize]);
+        self.pairs.push(pair);
+        self.normals.push(normal);
+        self.distances.push(distance);
+        self.overlaps.push(i + j - distance);
     }
 
     /// Those `stretches` of `contacts`, one after the other.
@@ -114,6 +134,12 @@ impl FrameContacts {
             forces: &self.forces,
         }
     }
+}
+
+/// `r_i − r_j`, the nearest image.
+fn between(packing: &Packing, positions: &[Vec2], [i, j]: [u32; 2]) -> Vec2 {
+    let difference = positions[i as usize] - positions[j as usize];
+    packing.domain().minimum_image(difference)
 }
 
 /// Stretches of `values`, one after the other.

@@ -3,7 +3,7 @@
 //! Scenes are lines of a scene file; one that this version does not know is left out and said so.
 
 use super::table::{Table, digits, median};
-use softjam::models::disks;
+use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Scene, start};
 use std::error::Error;
@@ -137,7 +137,7 @@ fn run(
     };
     let clock = Instant::now();
     let mut packing = start::packing(&scene)?;
-    disks::relax(&mut packing, &scene.disks, scene.line_tension);
+    relax_disks(&mut packing, &scene.disks, scene.line_tension).unwrap();
     let disks = clock.elapsed().as_secs_f64();
     if *factor != 1.0 {
         // FIRE starts at a known part of its bound.

@@ -6,8 +6,8 @@
 //! comes one with two threads, which a packing of fewer than some 7000 particles does not use.
 
 use super::table::{Table, digits, median};
-use softjam::models::disks;
 use softjam::numerics::threads;
+use softjam::protocol::relax_disks;
 use softjam::protocol::{RelaxError, Relaxation};
 use softjam::scene::{Scene, start};
 use std::error::Error;
@@ -40,14 +40,14 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
             scene.disks.threshold = 1e-4;
             let mut packing = start::packing(&scene)?;
             let clock = Instant::now();
-            let report = disks::relax(&mut packing, &scene.disks, scene.line_tension);
+            let report = relax_disks(&mut packing, &scene.disks, scene.line_tension).unwrap();
             let disks =
                 clock.elapsed().as_secs_f64() / (report.steps.max(1) as f64 * particles as f64);
             let mut run = Relaxation::of_packing(&scene, packing)?;
             for _ in 0..100 {
                 run.advance()?;
             }
-            let before = run.law().work();
+            let before = run.law().unwrap().work();
             runs.push((run, before, disks, [Vec::new(), Vec::new()]));
         }
         let rounds = if quick { 2 } else { 8 };
@@ -68,7 +68,7 @@ pub fn measure(quick: bool) -> Result<Table, Box<dyn Error>> {
         }
         for (run, before, disks, [one, two]) in runs {
             let (n, steps) = (run.packing().len() as f64, (run.step() - 100) as f64);
-            let work = run.law().work();
+            let work = run.law().unwrap().work();
             table.push(vec![
                 run.packing().len().to_string(),
                 phi.to_string(),

@@ -4,9 +4,9 @@ use super::families::{Case, common};
 use super::outcome::of_packing;
 use super::random::Random;
 use softjam::domain::{Domain, Vec2};
-use softjam::models::disks;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::ContactLaw;
+use softjam::protocol::relax_disks;
 use softjam::scene::{Radii, Scene, Species, Start};
 use softjam::state::Packing;
 use std::f64::consts::PI;
@@ -149,7 +149,7 @@ pub fn coincident() -> Vec<Case> {
     let mut push = |name: String, p: &Packing| {
         cases.push(case(format!("{name}, as it stands"), p.clone()));
         let mut relaxed = p.clone();
-        disks::relax(&mut relaxed, &DiskParameters::default(), 1.0);
+        relax_disks(&mut relaxed, &DiskParameters::default(), 1.0).unwrap();
         cases.push(case(format!("{name}, disks relaxed"), relaxed));
     };
     for n in 2..=12 {

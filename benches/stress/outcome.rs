@@ -3,9 +3,9 @@
 use super::stiffness::Spectrum;
 use super::verify::{Answer, Check};
 use softjam::analysis::Stability;
-use softjam::models::disks;
 use softjam::models::droplet::contact::ContactError;
 use softjam::models::droplet::contact::solver::SolverError;
+use softjam::protocol::relax_disks;
 use softjam::protocol::{RelaxError, Relaxation, Status};
 use softjam::scene::{Scene, SceneError, start};
 use softjam::state::Packing;
@@ -38,7 +38,7 @@ pub fn of_scene(scene: &Scene) -> Outcome {
         scene.validate()?;
         let mut packing = start::packing(scene)?;
         if scene.starts_from_disks() {
-            disks::relax(&mut packing, &scene.disks, scene.line_tension);
+            relax_disks(&mut packing, &scene.disks, scene.line_tension).unwrap();
         }
         Ok(packing)
     })

@@ -56,7 +56,7 @@ impl Spectrum {
             centres: &positions.map(|x| [x.x, x.y]).collect::<Vec<_>>(),
             pairs: &kept.iter().map(|&c| contacts.pairs[c]).collect::<Vec<_>>(),
             forces: &kept.iter().map(|&c| contacts.forces[c]).collect::<Vec<_>>(),
-            line_tension: run.law().line_tension(),
+            line_tension: run.law().unwrap().line_tension(),
             gradient: form == Form::Gradient,
         })
     }
@@ -68,7 +68,7 @@ impl Spectrum {
             .forces
             .iter()
             .fold(0.0, |m: f64, f| m.max(*f));
-        let most = most / run.law().line_tension();
+        let most = most / run.law().unwrap().line_tension();
         match run.stability() {
             Some(Stability::Minimum) => self.negative == 0,
             Some(Stability::Saddle) => self.negative > 0,

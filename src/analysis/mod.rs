@@ -25,7 +25,6 @@ mod stability;
 mod sums;
 
 pub use frame_forces::FrameForces;
-pub(crate) use observables::mean_coordination;
 pub use observables::{METRICS, Metrics, Observables};
 pub use rattlers::{Backbone, backbone, held};
 pub use stability::Stability;

@@ -4,6 +4,7 @@ use super::{Backbone, sums::Sums};
 use crate::contacts::Contacts;
 use crate::domain::Domain;
 use crate::models::droplet::contact::ContactLaw;
+use crate::models::{AnyModel, Model};
 use crate::state::Packing;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
@@ -127,6 +128,27 @@ impl Observables {
         (o.rattlers, o.backbone_contacts) =
             backbone.count_touching(particles, contacts, o.contacts);
         o
+    }
+
+    /// Observables of what `model` found last, with the time step `dt` and a counter of rattlers that remembers the frame before.
+    pub(crate) fn of_model(
+        model: &AnyModel,
+        packing: &Packing,
+        dt: f64,
+        backbone: &mut Backbone,
+    ) -> Self {
+        let (domain, particles) = (packing.domain(), packing.len());
+        let (gamma, f_max) = (model.line_tension(), model.f_max());
+        let AnyModel::MorseWitten(droplets) = model else {
+            let contacts = model.contacts(packing);
+            return Self::counted(&contacts, domain, particles, gamma, (f_max, dt), backbone);
+        };
+        let law = droplets.law();
+        let o = Self::of_law(law, packing, (f_max, dt), backbone);
+        if model.torques().is_empty() {
+            return o;
+        }
+        o.with_torques(&law.contacts(), domain, gamma, model.torques())
     }
 
     /// [`counted`](Self::counted) with the contacts that `law` found last: the same bits, and the contacts need not be put in
@@ -273,7 +295,7 @@ impl Observables {
 }
 
 /// `Z = 2 N_c / N` of `held` particles with `contacts` among them; 0 where there is none.
-pub(crate) fn mean_coordination(contacts: usize, held: usize) -> f64 {
+fn mean_coordination(contacts: usize, held: usize) -> f64 {
     if held == 0 {
         0.0
     } else {

@@ -18,11 +18,13 @@
 //! rattler but a saddle.
 
 use crate::analysis::held;
+use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::minimize::newton::{Stiffness, dot};
 use crate::models::droplet::Form;
 use crate::models::droplet::contact::ContactLaw;
 use crate::models::droplet::linear::Linear;
+use crate::models::{AnyModel, Model, disks};
 use crate::numerics::folded;
 use crate::state::Packing;
 use nalgebra::{DMatrix, DVector};
@@ -139,10 +141,10 @@ impl From<Stability> for Judgement {
     }
 }
 
-/// Judges the packing that `law` has the contacts and forces of; `f_max` is its largest net force (units of γ).
-pub(crate) fn judge(packing: &Packing, law: &ContactLaw, form: Form, f_max: f64) -> Judgement {
-    let contacts = law.contacts();
-    let net = f_max * law.line_tension();
+/// Judges the packing that `model` has the contacts and forces of.
+pub(crate) fn judge(packing: &Packing, model: &AnyModel) -> Judgement {
+    let contacts = model.contacts(packing);
+    let net = model.f_max() * model.line_tension();
     let borne: Vec<bool> = contacts.forces.iter().map(|f| *f > BORNE * net).collect();
     let bearing = contacts.forces.iter().zip(&borne).filter(|(_, b)| **b);
     let (number, sum) = bearing.fold((0.0, 0.0), |(n, s), (f, _)| (n + 1.0, s + f));
@@ -157,43 +159,69 @@ pub(crate) fn judge(packing: &Packing, law: &ContactLaw, form: Form, f_max: f64)
         let [i, j] = contacts.pairs[c];
         borne[c] || (held[i as usize] && held[j as usize])
     };
-    let kept: Vec<usize> = (0..borne.len()).filter(counts).collect();
-    let judged = if kept.len() == borne.len() {
-        lowest(packing, law, form)
+    let kept: Vec<_> = (0..borne.len()).filter(counts).map(|c| c..c + 1).collect();
+    let part;
+    let contacts = if kept.len() == borne.len() {
+        contacts
     } else {
-        let pairs: Vec<_> = kept.iter().map(|&c| contacts.pairs[c]).collect();
-        let forces: Vec<_> = kept.iter().map(|&c| contacts.forces[c]).collect();
-        let mut part = law.clone();
-        part.restore(packing, &pairs, &forces);
-        lowest(packing, &part, form)
+        part = FrameContacts::picked(&contacts, &kept);
+        part.view()
+    };
+    let judged = match model {
+        AnyModel::MorseWitten(droplets) if kept.len() == borne.len() => {
+            lowest_of_droplets(packing, droplets.law(), droplets.form())
+        }
+        AnyModel::MorseWitten(droplets) => {
+            let mut law = droplets.law().clone();
+            law.restore(packing, contacts.pairs, contacts.forces);
+            lowest_of_droplets(packing, &law, droplets.form())
+        }
+        AnyModel::Disks(_) => {
+            let compliances = disks::compliances(packing, contacts.pairs, model.line_tension());
+            lowest(packing.len(), &contacts, &compliances, |x, y| {
+                disks::answer(&contacts, &compliances, x, y);
+                true
+            })
+        }
     };
     judged.unwrap_or(Stability::NotJudged.into())
 }
 
-/// The sign of the lowest eigenvalue of `K u = λ K̃ u`; `None` where it does not show.
-fn lowest(packing: &Packing, law: &ContactLaw, form: Form) -> Option<Judgement> {
-    let contacts = law.contacts();
-    let mut metric = Stiffness::default();
-    let compliances = law.matrix().diagonal();
-    let mut rebuild = |prestress| metric.rebuild(&contacts, compliances, packing.len(), prestress);
-    rebuild(PRESTRESS).or_else(|_| rebuild(0.0)).ok()?;
+fn lowest_of_droplets(packing: &Packing, law: &ContactLaw, form: Form) -> Option<Judgement> {
     let mut linear = Linear::default();
     let mut linear = linear.at(form, law, packing);
-    let mut basis = vec![Displacement::first(packing.len(), contacts.pairs, &metric)?];
+    let compliances = law.matrix().diagonal();
+    lowest(packing.len(), &law.contacts(), compliances, |x, y| {
+        linear.product(x, y, ACCURACY)
+    })
+}
+
+/// The sign of the lowest eigenvalue of `K u = λ K̃ u`; `None` where it does not show. `product` makes `−K x` of its first argument
+/// (two numbers a particle) in its second and says whether it could.
+fn lowest(
+    particles: usize,
+    contacts: &Contacts<'_>,
+    compliances: &[f64],
+    mut product: impl FnMut(&[f64], &mut [f64]) -> bool,
+) -> Option<Judgement> {
+    let mut metric = Stiffness::default();
+    let mut rebuild = |prestress| metric.rebuild(contacts, compliances, particles, prestress);
+    rebuild(PRESTRESS).or_else(|_| rebuild(0.0)).ok()?;
+    let mut basis = vec![Displacement::first(particles, contacts.pairs, &metric)?];
     // The products in the basis: h_kl = v_k·K v_l.
     let mut h = DMatrix::zeros(MOST + 1, MOST);
     // Looks in a row at which a positive Ritz value had decided.
     let mut positive = 0;
     // Displacements of the particles that have contacts, but for the two translations: there are no more directions.
-    let mut touched = vec![false; packing.len()];
+    let mut touched = vec![false; particles];
     for &[i, j] in contacts.pairs {
         (touched[i as usize], touched[j as usize]) = (true, true);
     }
     let whole = (2 * touched.iter().filter(|t| **t).count()).saturating_sub(2);
     for k in 0..MOST {
         let mut next = Displacement::default();
-        next.force.resize(2 * packing.len(), 0.0);
-        if !linear.product(&basis[k].shift, &mut next.force, ACCURACY) {
+        next.force.resize(2 * particles, 0.0);
+        if !product(&basis[k].shift, &mut next.force) {
             return None;
         }
         for f in &mut next.force {

@@ -10,6 +10,7 @@ use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::BITS;
 use softjam::analysis::Observables;
 use softjam::analysis::Stability;
+use softjam::models::Model;
 use softjam::models::droplet::validity::Validity;
 use softjam::numerics::threads;
 use softjam::protocol::{Relaxation, Status};
@@ -542,7 +543,7 @@ fn report(
         "contact law",
         format!(
             "residual {:.1e} of the largest overlap",
-            run.law().residual()
+            run.model().residual()
         ),
     );
     let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);

@@ -1,4 +1,202 @@
-//! Models of particles: what contacts there are at given positions, and what forces they exert.
+//! Models of particles: which particles touch at given positions, and what forces that takes.
+//!
+//! A model is asked for the forces of a packing by [`Model::solve`], and tells its contacts and net forces. What drives it
+//! (minimisers, protocols, analyses, recorders) knows [`Model`] and no more. [`AnyModel`] is the one that a scene names.
+//!
+//! ```
+//! use softjam::domain::{Domain, Vec2};
+//! use softjam::models::{Goal, Kind, Model};
+//! use softjam::scene::Scene;
+//! use softjam::state::Packing;
+//!
+//! let at = |x| Vec2::new(x, 2.0);
+//! let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
+//! for model in [Kind::MorseWitten, Kind::Disks] {
+//!     let mut model = Scene { model, ..Scene::default() }.model();
+//!     model.solve(&packing, Goal::EXACT).unwrap();
+//!     // A contact on its own is a spring of stiffness 4πγ / 3 (R_i + R_j) in either.
+//!     let force = model.contacts(&packing).forces[0];
+//!     assert!((force - 0.1 * 4.0 * std::f64::consts::PI / 3.0).abs() < 1e-13);
+//! }
+//! ```
 
 pub mod disks;
 pub mod droplet;
+
+use crate::contacts::Contacts;
+use crate::domain::Vec2;
+use crate::state::Packing;
+use disks::Disks;
+use droplet::MorseWitten;
+use droplet::contact::ContactError;
+
+/// What a model has to give.
+///
+/// See the example of the [module](self).
+pub trait Model {
+    /// Line tension γ, the unit of force.
+    fn line_tension(&self) -> f64;
+
+    /// Contacts and net forces at the positions of `packing`, as exactly as `goal` asks.
+    ///
+    /// # Errors
+    ///
+    /// [`ContactError`] if there is no answer; what the model tells is then of no use.
+    fn solve(&mut self, packing: &Packing, goal: Goal) -> Result<(), ContactError>;
+
+    /// Takes contacts and forces of a frame as the answer at the positions of `packing`, without solving: the same net
+    /// forces, to the last bit, as in the run that the frame is from.
+    fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]);
+
+    /// The net force on each particle (force).
+    fn net_forces(&self) -> &[Vec2];
+
+    /// The largest net force (units of γ).
+    fn f_max(&self) -> f64;
+
+    /// The contacts, in the order of their pairs; `packing` is the one solved last.
+    fn contacts<'a>(&'a self, packing: &Packing) -> Contacts<'a>;
+
+    /// Pairs and forces of [`contacts`](Self::contacts), copied to where others were.
+    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>);
+
+    /// The torque of each contact (force·length), where contacts push aside as well as away; otherwise empty.
+    fn torques(&self) -> &[f64];
+
+    /// How far the answer is from the law of the contacts, relative to the largest `|δ|`.
+    fn residual(&self) -> f64;
+
+    /// The residual that a frame in balance may have.
+    fn accepted_residual(&self) -> f64;
+
+    /// The residual that a frame may have whose balance is asked for to `threshold` (units of γ).
+    fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64;
+
+    /// The upper bound of the minimiser's time step (time, mass 1) at the contacts found last.
+    ///
+    /// # Errors
+    ///
+    /// [`ContactError`] if a linear system is not solved.
+    fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError>;
+}
+
+/// How exactly a model is to be solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// `f_max` of the frame before (units of γ): far from balance forces need not be more exact than they are balanced.
+    pub f_max: f64,
+    /// `f_max` (units of γ) at which a run ends; a frame below it is solved as exactly as the scene asks.
+    pub threshold: f64,
+    /// No particle has moved by more than this (length) since the solution before.
+    pub moved: f64,
+}
+
+impl Goal {
+    /// As exactly as the scene asks, wherever the particles are.
+    pub const EXACT: Self = Self {
+        f_max: 0.0,
+        threshold: 0.0,
+        moved: f64::INFINITY,
+    };
+
+    /// The `f_max` that the tolerance follows: 0, for the full tolerance, in a frame that might be the last.
+    pub(crate) fn due(&self, f_max: f64) -> f64 {
+        if f_max > self.threshold { f_max } else { 0.0 }
+    }
+}
+
+/// The models by the names that scenes have for them.
+///
+/// ```
+/// assert_eq!(softjam::models::Kind::default().name(), "morse-witten");
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Droplets that dent and bulge: Saitoh 2.2.
+    #[default]
+    MorseWitten,
+    /// Undeformed disks that repel with `f = k δ`: Saitoh 2.2.1.
+    Disks,
+}
+
+impl Kind {
+    /// The name in scenes.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MorseWitten => "morse-witten",
+            Self::Disks => "disks",
+        }
+    }
+}
+
+/// The model that a scene names.
+///
+/// See the example of the [module](self).
+#[derive(Clone, Debug)]
+pub enum AnyModel {
+    /// Droplets.
+    MorseWitten(Box<MorseWitten>),
+    /// Undeformed disks.
+    Disks(Disks),
+}
+
+macro_rules! each {
+    ($self:ident, $model:ident => $call:expr) => {
+        match $self {
+            Self::MorseWitten($model) => $call,
+            Self::Disks($model) => $call,
+        }
+    };
+}
+
+impl Model for AnyModel {
+    fn line_tension(&self) -> f64 {
+        each!(self, model => model.line_tension())
+    }
+
+    fn solve(&mut self, packing: &Packing, goal: Goal) -> Result<(), ContactError> {
+        each!(self, model => model.solve(packing, goal))
+    }
+
+    fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
+        each!(self, model => model.restore(packing, pairs, forces));
+    }
+
+    fn net_forces(&self) -> &[Vec2] {
+        each!(self, model => model.net_forces())
+    }
+
+    fn f_max(&self) -> f64 {
+        each!(self, model => model.f_max())
+    }
+
+    fn contacts<'a>(&'a self, packing: &Packing) -> Contacts<'a> {
+        each!(self, model => model.contacts(packing))
+    }
+
+    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        each!(self, model => model.copy_contacts(packing, pairs, forces));
+    }
+
+    fn torques(&self) -> &[f64] {
+        each!(self, model => model.torques())
+    }
+
+    fn residual(&self) -> f64 {
+        each!(self, model => model.residual())
+    }
+
+    fn accepted_residual(&self) -> f64 {
+        each!(self, model => model.accepted_residual())
+    }
+
+    fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64 {
+        each!(self, model => model.promised_residual(packing, threshold))
+    }
+
+    fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
+        each!(self, model => model.longest_time_step(packing))
+    }
+}

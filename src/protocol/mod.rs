@@ -25,4 +25,4 @@
 
 mod relax;
 
-pub use relax::{RelaxError, Relaxation, Status};
+pub use relax::{DiskReport, RelaxError, Relaxation, Status, relax_disks};

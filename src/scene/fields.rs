@@ -2,6 +2,7 @@
 
 use super::{Channels, Minimizer, Preparation, Radii, Scene, SceneError, Species, Start};
 use crate::minimize::fire::Fire;
+use crate::models::Kind;
 use crate::models::disks::DiskParameters;
 use crate::models::droplet::Form;
 use crate::models::droplet::contact::Rule;
@@ -43,6 +44,7 @@ pub struct SceneFields {
     pub line_tension: Option<f64>,
     pub threshold: Option<f64>,
     pub steps: Option<i128>,
+    pub model: Option<Kind>,
     pub minimizer: Option<Minimizer>,
     pub forces: Option<Form>,
     pub dt_max: Option<f64>,
@@ -218,6 +220,7 @@ impl SceneFields {
             line_tension,
             threshold,
             steps,
+            model,
             minimizer,
             forces,
             dt_max,
@@ -254,6 +257,7 @@ impl SceneFields {
             line_tension: self.line_tension.unwrap_or(default.line_tension),
             threshold: self.threshold.unwrap_or(default.threshold),
             steps: count("steps", self.steps, default.steps, 0)?,
+            model: self.model.unwrap_or_default(),
             minimizer: self.minimizer.unwrap_or_default(),
             forces: self.forces.unwrap_or_default(),
             dt_max: self.dt_max,

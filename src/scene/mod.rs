@@ -27,11 +27,12 @@ pub use fields::{DiskFields, SceneFields};
 pub use schedule::{Channels, Schedule};
 
 use crate::minimize::fire::Fire;
-use crate::models::disks::DiskParameters;
-use crate::models::droplet::Form;
+use crate::models::disks::{DiskParameters, Disks};
 use crate::models::droplet::contact::solver::Method;
 use crate::models::droplet::contact::{ContactLaw, Rule};
 use crate::models::droplet::contour::ContourStyle;
+use crate::models::droplet::{Form, MorseWitten};
+use crate::models::{AnyModel, Kind};
 use crate::text::{lines, shown};
 
 /// One kind of particle in a mixture.
@@ -178,6 +179,8 @@ pub struct Scene {
     pub threshold: f64,
     /// The run ends at this step in any case. Default 200 000.
     pub steps: u64,
+    /// The model of the particles. Default Morse–Witten droplets.
+    pub model: Kind,
     /// The minimiser.
     pub minimizer: Minimizer,
     /// The forces that move the particles. Default central.
@@ -213,6 +216,7 @@ impl Default for Scene {
             line_tension: 1.0,
             threshold: 1e-10,
             steps: 200_000,
+            model: Kind::default(),
             minimizer: Minimizer::default(),
             forces: Form::default(),
             dt_max: None,
@@ -385,7 +389,8 @@ impl Scene {
         Ok(self)
     }
 
-    /// Whether the centres are relaxed as undeformed disks first; those of a start file are if it is asked for.
+    /// Whether the centres are relaxed as undeformed disks before the run; those of a start file are if it is asked for. A run of
+    /// disks is that relaxation.
     ///
     /// ```
     /// use softjam::scene::Scene;
@@ -394,10 +399,11 @@ impl Scene {
     /// ```
     #[must_use]
     pub fn starts_from_disks(&self) -> bool {
-        match self.start {
+        let prepared = match self.start {
             Start::Random | Start::Hexagonal => true,
             Start::File { preparation, .. } => preparation == Preparation::Relaxed,
-        }
+        };
+        prepared && self.model != Kind::Disks
     }
 
     /// Whether particles, radii and box come from a file.
@@ -410,11 +416,20 @@ impl Scene {
         matches!(self.start, Start::File { .. })
     }
 
-    /// The contact law that the scene asks for.
+    /// The model that the scene asks for, with nothing solved yet.
     ///
-    /// ```
-    /// assert_eq!(softjam::scene::Scene::default().contact_law().line_tension(), 1.0);
-    /// ```
+    /// See the example of [`models`](crate::models).
+    #[must_use]
+    pub fn model(&self) -> AnyModel {
+        match self.model {
+            Kind::Disks => AnyModel::Disks(Disks::new(self.line_tension)),
+            Kind::MorseWitten => {
+                AnyModel::MorseWitten(Box::new(MorseWitten::new(self.contact_law(), self.forces)))
+            }
+        }
+    }
+
+    /// The contact law of droplets that the scene asks for.
     #[must_use]
     pub fn contact_law(&self) -> ContactLaw {
         ContactLaw::new(

@@ -1,6 +1,7 @@
 //! The scene as a commented TOML text.
 
 use super::{Preparation, Radii, Scene, Start};
+use crate::models::Kind;
 use crate::text::is_hidden;
 use core::fmt::Write as _;
 
@@ -127,37 +128,48 @@ impl Scene {
             "steps",
             self.steps,
         );
+        if self.model != Kind::default() {
+            page.field(
+                "Model: \"morse-witten\" (droplets) or \"disks\" (undeformed, f = k delta).",
+                "model",
+                value(&self.model),
+            );
+        }
         page.field(
             "Minimiser: \"fire\", or \"fire+newton\" (FIRE through the rearrangements, then Newton's method).",
             "minimizer",
             value(&self.minimizer),
         );
-        page.field(
+        if self.model == Kind::MorseWitten {
+            page.field(
             "Forces: \"central\" (along the lines of centres) or \"gradient\" (of the stored energy).",
             "forces",
             value(&self.forces),
         );
+        }
         match self.dt_max {
             Some(dt_max) => page.field("Upper bound of the time step.", "dt_max", number(dt_max)),
             None => page.text(
                 "\n# Upper bound of the time step; without it, 1.2 / omega_max from the start's largest frequency.\n# dt_max = 0.2",
             ),
         }
-        page.field(
+        if self.model == Kind::MorseWitten {
+            page.field(
             "Contact list: \"complementarity\" (f >= 0, gap >= 0, f gap = 0 in every step) or \"saitoh\" (one drop-and-add a step).",
             "contact_rule",
             value(&self.contact_rule),
         );
-        page.field(
+            page.field(
             "Solver of A f = delta: \"conjugate-gradient\", \"sparse-cholesky\" or \"gauss-jordan\".",
             "contact_solver",
             value(&self.contact_solver),
         );
-        page.field(
-            "Residual of A f = delta relative to the largest overlap, 1e-14 … 1e-6.",
-            "contact_tolerance",
-            number(self.contact_tolerance),
-        );
+            page.field(
+                "Residual of A f = delta relative to the largest overlap, 1e-14 … 1e-6.",
+                "contact_tolerance",
+                number(self.contact_tolerance),
+            );
+        }
         let fire = &self.fire;
         page.text("\n# FIRE 2.0 (Guénolé et al., 2020): N_delay, f_inc, f_dec, alpha_start, f_alpha; the first and the least\n# time step as fractions of dt_max.\n[fire]");
         page.line("delay", fire.delay);
@@ -167,6 +179,9 @@ impl Scene {
         page.line("mixing_decay", number(fire.mixing_decay));
         page.line("first_dt", number(fire.first_dt));
         page.line("least_dt", number(fire.least_dt));
+        if self.model == Kind::Disks {
+            return;
+        }
         if self.starts_from_file() {
             page.text("\n# With relax = true the undeformed disks of the file are relaxed first: to this f_max, or for that many steps.\n[disks]");
             page.line("relax", self.starts_from_disks());

@@ -1,6 +1,9 @@
 //! The allowed ranges.
 
-use super::{Minimizer, Radii, Scene, SceneError, Start};
+use super::{Minimizer, Preparation, Radii, Scene, SceneError, Start};
+use crate::models::Kind;
+use crate::models::droplet::Form;
+use crate::models::droplet::contact::Rule;
 use crate::models::droplet::contact::solver::Method;
 
 /// What waits for a recorder or is under way in it, and in a second one or a live view, does not grow beyond this (bytes); 100 kB
@@ -39,6 +42,7 @@ impl Scene {
             (1e-14..=1e-6).contains(&self.contact_tolerance),
             "1e-14 ≤ contact_tolerance ≤ 1e-6 (residual relative to the largest overlap)",
         )?;
+        self.validate_model()?;
         self.validate_minimizer()?;
         within(
             "contours.vertices",
@@ -56,6 +60,48 @@ impl Scene {
             return Ok(());
         }
         self.validate_packing()
+    }
+
+    /// What belongs to droplets is not asked of disks.
+    fn validate_model(&self) -> Result<(), SceneError> {
+        let relaxed = matches!(
+            self.start,
+            Start::File { preparation, .. } if preparation == Preparation::Relaxed
+        );
+        let [newton, turning, saitoh] = [
+            self.minimizer == Minimizer::FireNewton,
+            self.forces == Form::Gradient,
+            self.contact_rule == Rule::Saitoh,
+        ];
+        let (field, value, why) = match self.model {
+            Kind::Disks if newton => (
+                "minimizer",
+                "fire+newton",
+                "Newton's method solves for contact forces that disks do not have; take fire",
+            ),
+            Kind::Disks if turning => (
+                "forces",
+                "gradient",
+                "disks have central forces alone, which are the gradient of their energy",
+            ),
+            Kind::Disks if saitoh => (
+                "contact_rule",
+                "saitoh",
+                "disks touch where they overlap; leave it out",
+            ),
+            Kind::Disks if relaxed => (
+                "disks.relax",
+                "true",
+                "the run itself relaxes them; leave it out",
+            ),
+            _ => return Ok(()),
+        };
+        Err(SceneError::Conflict {
+            field: field.into(),
+            value: format!("\"{value}\""),
+            with: "model = \"disks\"".into(),
+            why: why.into(),
+        })
     }
 
     fn validate_minimizer(&self) -> Result<(), SceneError> {

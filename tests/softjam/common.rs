@@ -1,10 +1,10 @@
 //! What several themes need: random numbers of the tests' own, packings to work on, and bounds that show their value.
 
 use softjam::domain::{Domain, Vec2};
-use softjam::models::disks;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
+use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Species};
 use softjam::state::Packing;
@@ -105,7 +105,7 @@ pub fn random_packing(
         steps: disk_steps,
         ..DiskParameters::default()
     };
-    disks::relax(&mut packing, &parameters, 1.0);
+    relax_disks(&mut packing, &parameters, 1.0).unwrap();
     packing
 }
 

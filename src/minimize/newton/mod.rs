@@ -53,10 +53,11 @@ mod stiffness;
 
 use crate::analysis::sum_of_forces;
 use crate::domain::Vec2;
-use crate::models::droplet::NetForces;
+use crate::models::Model;
 use crate::models::droplet::contact::ContactLaw;
 use crate::models::droplet::contact::solver::ConjugateGradient;
 use crate::models::droplet::linear::Linear;
+use crate::models::droplet::{MorseWitten, NetForces};
 use crate::state::Packing;
 pub(crate) use gmres::dot;
 use gmres::{Gmres, Report};
@@ -167,19 +168,33 @@ pub(crate) struct Newton {
 }
 
 impl Newton {
-    /// Whether `f_max` (units of γ) is low enough for an attempt; right behind a step that was kept (`goes_on`) it may have
-    /// grown.
-    pub(crate) fn is_due(f_max: f64, law: &ContactLaw, goes_on: bool) -> bool {
+    /// Whether `f_max` is low enough for an attempt; right behind a step that was kept (`goes_on`) it may have grown.
+    pub(crate) fn is_due(droplets: &MorseWitten, goes_on: bool) -> bool {
         let most = if goes_on { GROWTH * SWITCH } else { SWITCH };
+        let law = droplets.law();
         let (number, sum) = sum_of_forces(law.numbered().forces);
-        f_max * law.line_tension() * number <= most * sum
+        droplets.f_max() * law.line_tension() * number <= most * sum
     }
 
-    /// Tries one step from the contacts and forces of `law` at the positions of `packing`, whose net forces are `net`.
+    /// Tries one step from the contacts and forces of `droplets` at the positions of `packing`.
     ///
-    /// If the step is kept, `packing` and `law` are at its end; otherwise they are as they were. `goal` is the `f_max` (units
-    /// of γ) below which nothing more is asked for; `patient` allows [`Attempt::Nearer`].
+    /// If the step is kept, both are at its end; otherwise they are as they were. `goal` is the `f_max` (units of γ) below which
+    /// nothing more is asked for; `patient` allows [`Attempt::Nearer`].
     pub(crate) fn advance(
+        &mut self,
+        packing: &mut Packing,
+        droplets: &mut MorseWitten,
+        goal: f64,
+        patient: bool,
+    ) -> Attempt {
+        let f_max = droplets.f_max();
+        let (law, form, net) = droplets.parts();
+        let attempt = self.attempt(packing, law, form, net, (f_max, goal), patient);
+        droplets.balance(packing);
+        attempt
+    }
+
+    fn attempt(
         &mut self,
         packing: &mut Packing,
         law: &mut ContactLaw,

@@ -1,13 +1,13 @@
 //! Forces of the disks, the hot loop of their relaxation.
 
+use super::stiffness_sum;
 use crate::contacts::largest_force;
 use crate::domain::{Vec2, nearest};
 use crate::numerics::wide::wide;
 use crate::state::Packing;
-use core::f64::consts::PI;
 
 /// Candidate pairs, ascending, with the sums `R_i + R_j` of their radii.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
     pairs: Vec<[u32; 2]>,
     sums: Vec<f64>,
@@ -26,7 +26,7 @@ impl Candidates {
 
     /// Net forces into `net`; the largest of them is returned.
     pub(super) fn forces(&self, packing: &Packing, line_tension: f64, net: &mut [Vec2]) -> f64 {
-        let stiffness_sum = 4.0 * PI * line_tension / 3.0; // k_ij (R_i + R_j)
+        let stiffness_sum = stiffness_sum(line_tension);
         let (fours, pairs) = self.pairs.as_chunks::<4>();
         let (sums_of_fours, sums) = self.sums.as_chunks::<4>();
         net.fill(Vec2::zeros());
@@ -187,6 +187,7 @@ impl Four {
 mod tests {
     use super::*;
     use crate::domain::Domain;
+    use core::f64::consts::PI;
     use proptest::prelude::*;
 
     proptest! {

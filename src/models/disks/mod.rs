@@ -1,20 +1,35 @@
-//! The packing of undeformed disks that a relaxation starts from, Saitoh 2.2.1.
+//! Undeformed disks, Saitoh 2.2.1: the model of the packing that droplets start from, and one of its own.
 //!
 //! Disks repel with `f = k_ij δ_ij` for `δ_ij > 0`, `k_ij = 4πγ / 3(R_i + R_j)`: the force of one Morse–Witten contact
-//! on its own, so that both stages share their units. FIRE relaxes them from zero velocity. Work and memory are O(N) a
-//! step, by a Verlet list from a cell list.
+//! on its own, so that both models share their units. Work and memory are O(N) a step, by a Verlet list from a cell list.
+//!
+//! ```
+//! use softjam::models::Kind;
+//! use softjam::protocol::{Relaxation, Status};
+//! use softjam::scene::Scene;
+//!
+//! let scene = Scene { particles: 64, phi: 0.9, model: Kind::Disks, ..Scene::default() };
+//! let mut run = Relaxation::new(&scene).unwrap();
+//! while run.status() == Status::Running {
+//!     run.advance().unwrap();
+//! }
+//! assert_eq!(run.status(), Status::Converged);
+//! assert!(run.observables().coordination() > 4.0);
+//! ```
 
 mod forces;
 
-use crate::analysis::{backbone, mean_coordination};
+use super::{Goal, Model};
+use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
-use crate::minimize::fire::{Fire, FireState};
+use crate::models::droplet::contact::ContactError;
 use crate::neighbors::NeighborList;
 use crate::state::Packing;
 use core::f64::consts::PI;
 use forces::Candidates;
+use std::sync::OnceLock;
 
-/// When the relaxation of the disks ends.
+/// When the relaxation of the disks that droplets start from ends.
 ///
 /// ```
 /// assert_eq!(softjam::models::disks::DiskParameters::default().threshold, 1e-6);
@@ -37,79 +52,164 @@ impl Default for DiskParameters {
     }
 }
 
-/// How the disks relaxed.
-///
-/// See the example of [`relax`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DiskReport {
-    /// Steps made.
-    pub steps: u64,
-    /// The largest net force at the end (units of γ).
-    pub f_max: f64,
-    /// Whether `f_max` is not above the threshold.
-    pub converged: bool,
-    /// Mean coordination number of the disks that are held; see
-    /// [`Observables::coordination`](crate::analysis::Observables::coordination).
-    pub coordination: f64,
-    /// Rattlers among the disks.
-    pub rattlers: usize,
+/// `k (R_i + R_j) = 4πγ/3` (force).
+pub(crate) fn stiffness_sum(line_tension: f64) -> f64 {
+    4.0 * PI * line_tension / 3.0
 }
 
-/// Relaxes the disks of `packing` in place; `line_tension` is γ (force, positive).
-///
-/// # Example
+/// Undeformed disks.
 ///
 /// ```
-/// use softjam::models::disks::{relax, DiskParameters};
 /// use softjam::domain::{Domain, Vec2};
+/// use softjam::models::{Goal, Model, disks::Disks};
 /// use softjam::state::Packing;
 ///
 /// let at = |x| Vec2::new(x, 2.0);
-/// let mut packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.7)]).unwrap();
-/// let report = relax(&mut packing, &DiskParameters::default(), 1.0);
-/// assert!(report.converged && report.f_max <= 1e-6);
-/// assert!(packing.separation(0, 1).norm() > 1.0 - 1e-6);
+/// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.7)]).unwrap();
+/// let mut disks = Disks::new(3.0);
+/// disks.solve(&packing, Goal::EXACT).unwrap();
+/// assert!((disks.f_max() - 0.3 * 4.0 * std::f64::consts::PI / 3.0).abs() < 1e-14);
 /// ```
-pub fn relax(packing: &mut Packing, parameters: &DiskParameters, line_tension: f64) -> DiskReport {
-    let fire = Fire::default();
-    let mut neighbors = NeighborList::new();
-    let mut candidates = Candidates::default();
-    let mut velocities = vec![Vec2::zeros(); packing.len()];
-    let mut net = vec![Vec2::zeros(); packing.len()];
-    let stiffest = 4.0 * PI * line_tension / (6.0 * packing.smallest_radius());
-    let mut state = FireState::start(&fire, DT_MAX / stiffest.sqrt());
-    let domain = packing.domain();
-    let radius = packing.ample_radius();
-    let mut skin = SKIN[1] * radius;
-    let (mut step, mut moved) = (0, f64::INFINITY);
-    loop {
-        if neighbors.update_after(packing, 0.0, skin, moved) {
-            candidates.renew(packing.radii(), neighbors.pairs());
+#[derive(Clone, Debug)]
+pub struct Disks {
+    /// γ (force).
+    line_tension: f64,
+    neighbors: NeighborList,
+    candidates: Candidates,
+    /// How far the neighbour list reaches beyond the disks (length); reaches no bit.
+    skin: f64,
+    net: Vec<Vec2>,
+    /// Largest net force (units of γ).
+    f_max: f64,
+    /// The contacts, once somebody asked.
+    contacts: OnceLock<FrameContacts>,
+}
+
+impl Disks {
+    /// Disks at line tension γ (force, positive).
+    #[must_use]
+    pub fn new(line_tension: f64) -> Self {
+        Self {
+            line_tension,
+            neighbors: NeighborList::new(),
+            candidates: Candidates::default(),
+            skin: f64::INFINITY,
+            net: Vec::new(),
+            f_max: 0.0,
+            contacts: OnceLock::new(),
         }
-        let f_max = candidates.forces(packing, line_tension, &mut net) / line_tension;
-        let converged = f_max <= parameters.threshold;
-        if converged || step >= parameters.steps {
-            let (rattlers, contacts) = backbone(packing.len(), &touching(packing, &neighbors));
-            return DiskReport {
-                steps: step,
-                f_max,
-                converged,
-                coordination: mean_coordination(contacts, packing.len() - rattlers),
-                rattlers,
-            };
+    }
+
+    fn contacts_at(&self, packing: &Packing) -> &FrameContacts {
+        let stiffness_sum = stiffness_sum(self.line_tension);
+        let force = |sum: f64, overlap: f64| stiffness_sum * overlap / sum;
+        self.contacts
+            .get_or_init(|| FrameContacts::touching(packing, self.neighbors.pairs(), force))
+    }
+}
+
+impl Model for Disks {
+    fn line_tension(&self) -> f64 {
+        self.line_tension
+    }
+
+    fn solve(&mut self, packing: &Packing, goal: Goal) -> Result<(), ContactError> {
+        self.contacts.take();
+        let radius = packing.ample_radius();
+        let skin = if goal.moved.is_finite() {
+            (12.0 * goal.moved * radius).sqrt()
+        } else {
+            self.skin
+        };
+        self.skin = skin.clamp(SKIN[0] * radius, SKIN[1] * radius);
+        if self
+            .neighbors
+            .update_after(packing, 0.0, self.skin, goal.moved)
+        {
+            self.candidates
+                .renew(packing.radii(), self.neighbors.pairs());
         }
-        moved = fire.advance(
-            &mut state,
-            &net,
-            &mut velocities,
-            packing.positions_mut(),
-            domain,
-        );
-        if moved.is_finite() {
-            skin = (12.0 * moved * radius).sqrt();
-            skin = skin.clamp(SKIN[0] * radius, SKIN[1] * radius);
-        }
-        step += 1;
+        self.net.resize(packing.len(), Vec2::zeros());
+        let largest = self
+            .candidates
+            .forces(packing, self.line_tension, &mut self.net);
+        self.f_max = largest / self.line_tension;
+        Ok(())
+    }
+
+    /// Forces follow from the positions alone.
+    fn restore(&mut self, packing: &Packing, _: &[[u32; 2]], _: &[f64]) {
+        // Disks have an answer at any positions.
+        let _: Result<(), ContactError> = self.solve(packing, Goal::EXACT);
+    }
+
+    fn net_forces(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    fn f_max(&self) -> f64 {
+        self.f_max
+    }
+
+    fn contacts<'a>(&'a self, packing: &Packing) -> Contacts<'a> {
+        self.contacts_at(packing).view()
+    }
+
+    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        let contacts = self.contacts_at(packing).view();
+        contacts.pairs.clone_into(pairs);
+        contacts.forces.clone_into(forces);
+    }
+
+    fn torques(&self) -> &[f64] {
+        &[]
+    }
+
+    fn residual(&self) -> f64 {
+        0.0
+    }
+
+    fn accepted_residual(&self) -> f64 {
+        0.0
+    }
+
+    fn promised_residual(&self, _: &Packing, _: f64) -> f64 {
+        0.0
+    }
+
+    /// `0.5/√k` of the stiffest pair.
+    fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
+        let stiffest = 4.0 * PI * self.line_tension / (6.0 * packing.smallest_radius());
+        Ok(DT_MAX / stiffest.sqrt())
+    }
+}
+
+/// `1/k` of contacts between `pairs` (length/force).
+pub(crate) fn compliances(packing: &Packing, pairs: &[[u32; 2]], line_tension: f64) -> Vec<f64> {
+    let radius = |p: u32| packing.radii()[p as usize];
+    let compliance = |&[i, j]: &[u32; 2]| (radius(i) + radius(j)) / stiffness_sum(line_tension);
+    pairs.iter().map(compliance).collect()
+}
+
+/// `y = J x`: how the net forces of `contacts` answer to displacements `x` (two numbers a particle), where `compliances` are
+/// `1/k` (length/force). With `x_c = dr_i − dr_j`, unit vector `n` and tangent `t` (`n` turned by a quarter)
+///
+/// ```text
+/// dF_i = Σ_c ( −k (n·x_c) n + (f/r) (t·x_c) t )
+/// ```
+pub(crate) fn answer(contacts: &Contacts<'_>, compliances: &[f64], x: &[f64], y: &mut [f64]) {
+    y.fill(0.0);
+    for (c, &[i, j]) in contacts.pairs.iter().enumerate() {
+        let (i, j) = (2 * i as usize, 2 * j as usize);
+        let x = Vec2::new(x[i] - x[j], x[i + 1] - x[j + 1]);
+        let n = contacts.normals[c];
+        let t = Vec2::new(-n.y, n.x);
+        let across = t * (t.dot(&x) * contacts.forces[c] / contacts.distances[c]);
+        let force = across - n * (n.dot(&x) / compliances[c]);
+        y[i] += force.x;
+        y[i + 1] += force.y;
+        y[j] -= force.x;
+        y[j + 1] -= force.y;
     }
 }
 
@@ -125,12 +225,42 @@ const DT_MAX: f64 = 0.5;
 /// pairs a particle in vain: both together cost least near `s = √(12 v R)`.
 const SKIN: [f64; 2] = [0.05, 0.8];
 
-/// The pairs of disks that overlap.
-fn touching(packing: &Packing, neighbors: &NeighborList) -> Vec<[u32; 2]> {
-    let overlap = |pair: &&[u32; 2]| {
-        let [i, j] = pair.map(|p| p as usize);
-        let sum = packing.radii()[i] + packing.radii()[j];
-        packing.separation(i, j).norm_squared() < sum * sum
-    };
-    neighbors.pairs().iter().filter(overlap).copied().collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Relaxation;
+    use crate::scene::Scene;
+
+    #[test]
+    fn answer_to_displacements_is_the_derivative_of_the_net_forces() {
+        let scene = Scene {
+            particles: 48,
+            phi: 1.0,
+            ..Scene::default()
+        };
+        let packing = Relaxation::new(&scene).unwrap().packing().clone();
+        let mut disks = Disks::new(1.7);
+        disks.solve(&packing, Goal::EXACT).unwrap();
+        let contacts = disks.contacts(&packing);
+        let compliances = compliances(&packing, contacts.pairs, 1.7);
+        let x: Vec<f64> = (0..96).map(|k| libm::sin(0.7 * f64::from(k + 1))).collect();
+        let mut product = vec![0.0; 96];
+        answer(&contacts, &compliances, &x, &mut product);
+        let moved = |h: f64| {
+            let mut moved = packing.clone();
+            for (p, s) in moved.positions_mut().iter_mut().zip(x.as_chunks::<2>().0) {
+                *p = packing.domain().wrap(*p + Vec2::new(s[0], s[1]) * h);
+            }
+            let mut there = Disks::new(1.7);
+            there.solve(&moved, Goal::EXACT).unwrap();
+            there.net_forces().to_vec()
+        };
+        let h = 1e-6;
+        let (minus, plus) = (moved(-h), moved(h));
+        for (k, (a, b)) in minus.iter().zip(&plus).enumerate() {
+            let slope = (b - a) / (2.0 * h);
+            assert!((slope.x - product[2 * k]).abs() < 1e-7, "particle {k}");
+            assert!((slope.y - product[2 * k + 1]).abs() < 1e-7, "particle {k}");
+        }
+    }
 }

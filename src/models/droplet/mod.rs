@@ -59,9 +59,11 @@ mod form;
 pub mod frequency;
 pub mod kernel;
 pub(crate) mod linear;
+mod morse_witten;
 mod outline;
 pub(crate) mod turning;
 pub mod validity;
 
 pub(crate) use form::tangent;
 pub use form::{Form, NetForces};
+pub use morse_witten::MorseWitten;

@@ -1,21 +1,18 @@
 //! The relaxation: the loop that yields frames.
 
+mod disks;
 mod present;
 mod status;
 mod take_over;
 
+pub use disks::{DiskReport, relax_disks};
 pub use status::{RelaxError, Status};
 
 use crate::analysis::{Judgement, Stability, judge};
-use crate::contacts::largest_force;
 use crate::domain::Vec2;
 use crate::minimize::fire::{Fire, FireState};
 use crate::minimize::newton::{Attempt, Newton};
-use crate::models::disks;
-use crate::models::disks::DiskReport;
-use crate::models::droplet::NetForces;
-use crate::models::droplet::contact::{ACCEPTED, ContactError, ContactLaw};
-use crate::models::droplet::frequency;
+use crate::models::{AnyModel, Goal, Model};
 use crate::scene::{Minimizer, Scene, start};
 use crate::state::Frame;
 use crate::state::Packing;
@@ -40,17 +37,14 @@ use std::sync::OnceLock;
 pub struct Relaxation {
     packing: Packing,
     velocities: Vec<Vec2>,
-    law: ContactLaw,
+    model: AnyModel,
     fire: Fire,
     state: FireState,
     step: u64,
     threshold: f64,
     step_limit: u64,
-    form: NetForces,
     /// What finishes; `None` where FIRE goes all the way.
     newton: Option<Newton>,
-    net: Vec<Vec2>,
-    f_max: f64,
     disks: Option<DiskReport>,
     /// What this frame is, if it is in balance and somebody asked.
     judgement: OnceLock<Judgement>,
@@ -93,7 +87,8 @@ impl Relaxation {
         scene.validate()?;
         let disks = scene
             .starts_from_disks()
-            .then(|| disks::relax(&mut packing, &scene.disks, scene.line_tension));
+            .then(|| relax_disks(&mut packing, &scene.disks, scene.line_tension))
+            .transpose()?;
         let run = Self::of_packing(scene, packing)?;
         Ok(Self { disks, ..run })
     }
@@ -114,48 +109,40 @@ impl Relaxation {
     /// ```
     pub fn of_packing(scene: &Scene, packing: Packing) -> Result<Self, RelaxError> {
         scene.validate()?;
-        let mut law = scene.contact_law();
-        law.solve(&packing, &[], &[])
-            .map_err(|source| RelaxError::Contact { step: 0, source })?;
-        let dt_max = if let Some(dt_max) = scene.dt_max {
-            dt_max
-        } else {
-            let omega = frequency::largest_frequency(&packing, &mut law, 20)
-                .map_err(|source| RelaxError::Contact { step: 0, source })?;
-            DT_MAX_TIMES_OMEGA / omega
+        let mut model = scene.model();
+        let at_start = |source| RelaxError::Contact { step: 0, source };
+        model.solve(&packing, Goal::EXACT).map_err(at_start)?;
+        let dt_max = match scene.dt_max {
+            Some(dt_max) => dt_max,
+            None => model.longest_time_step(&packing).map_err(at_start)?,
         };
         let state = FireState::start(&scene.fire, dt_max);
         let velocities = vec![Vec2::zeros(); packing.len()];
-        Ok(Self::at(scene, packing, law, (0, velocities, state)))
+        Ok(Self::at(scene, packing, model, (0, velocities, state)))
     }
 
-    /// A run of `scene` at a step with its velocities and minimiser; `law` has its contacts and forces.
+    /// A run of `scene` at a step with its velocities and minimiser; `model` has its contacts and forces.
     fn at(
         scene: &Scene,
         packing: Packing,
-        law: ContactLaw,
+        model: AnyModel,
         (step, velocities, state): (u64, Vec<Vec2>, FireState),
     ) -> Self {
-        let mut run = Self {
-            form: NetForces::new(scene.forces),
+        Self {
             newton: (scene.minimizer == Minimizer::FireNewton).then(Newton::default),
-            net: vec![Vec2::zeros(); packing.len()],
             packing,
             velocities,
-            law,
+            model,
             fire: scene.fire,
             state,
             step,
             threshold: scene.threshold,
             step_limit: scene.steps,
-            f_max: 0.0,
             disks: None,
             judgement: OnceLock::new(),
             yielded: false,
             failed: false,
-        };
-        run.balance();
-        run
+        }
     }
 
     /// Goes on from a frame of an earlier run of `scene`, exactly as that run did.
@@ -177,10 +164,10 @@ impl Relaxation {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
         *packing.positions_mut() = frame.positions;
-        let mut law = scene.contact_law();
-        law.restore(&packing, &frame.contacts, &frame.forces);
+        let mut model = scene.model();
+        model.restore(&packing, &frame.contacts, &frame.forces);
         let moving = (frame.step, frame.velocities, frame.minimizer);
-        Ok(Self::at(scene, packing, law, moving))
+        Ok(Self::at(scene, packing, model, moving))
     }
 
     /// One move and the contact problem after it.
@@ -202,14 +189,14 @@ impl Relaxation {
         }
         if self.finish() {
             self.step += 1;
-            self.balance();
+            self.judgement.take();
             return Ok(());
         }
         let domain = self.packing.domain();
         // Infinite after a step back: then each velocity is looked at.
         let moved = self.fire.advance(
             &mut self.state,
-            &self.net,
+            self.model.net_forces(),
             &mut self.velocities,
             self.packing.positions_mut(),
             domain,
@@ -221,6 +208,8 @@ impl Relaxation {
         let within = |v: &Vec2| (v * dt).norm_squared() <= far * far;
         let thrown = |v: &Vec2| !within(v);
         let near = moved <= 0.99 * far;
+        // Disks push each other by finite forces, however far they overlap.
+        let near = near || matches!(self.model, AnyModel::Disks(_));
         if !near && let Some(particle) = self.velocities.iter().position(thrown) {
             self.failed = true;
             return Err(RelaxError::TooFar {
@@ -258,9 +247,16 @@ impl Relaxation {
         self.solve_or_fail(1.01 * moved)
     }
 
+    /// The model at the new positions; no particle has moved by more than `moved` (length).
     fn solve_or_fail(&mut self, moved: f64) -> Result<(), RelaxError> {
         let step = self.step;
-        self.solve(moved).map_err(|source| {
+        let goal = Goal {
+            f_max: self.model.f_max(),
+            threshold: self.threshold,
+            moved,
+        };
+        self.judgement.take();
+        self.model.solve(&self.packing, goal).map_err(|source| {
             self.failed = true;
             RelaxError::Contact { step, source }
         })
@@ -270,13 +266,14 @@ impl Relaxation {
     ///
     /// After a step that is kept the particles are at rest, and FIRE would start anew.
     fn finish(&mut self) -> bool {
-        let Some(newton) = &mut self.newton else {
+        let (Some(newton), AnyModel::MorseWitten(droplets)) = (&mut self.newton, &mut self.model)
+        else {
             return false;
         };
         // Only Newton's method leaves the particles at rest.
         let goes_on =
             self.state.turns.moves > 0 && self.velocities.iter().all(|v| *v == Vec2::zeros());
-        if !Newton::is_due(self.f_max, &self.law, goes_on) {
+        if !Newton::is_due(droplets, goes_on) {
             return false;
         }
         let turns = &mut self.state.turns;
@@ -286,10 +283,8 @@ impl Relaxation {
         }
         let attempt = newton.advance(
             &mut self.packing,
-            &mut self.law,
-            &mut self.form,
-            &self.net,
-            (self.f_max, self.threshold),
+            droplets,
+            self.threshold,
             turns.is_patient(),
         );
         let kept = attempt != Attempt::GivenUp;
@@ -303,61 +298,16 @@ impl Relaxation {
         kept
     }
 
-    /// The contact problem at the new positions, to the tolerance that is due at the `f_max` that its forces give.
-    ///
-    /// The tolerance at first is that of the frame before; it is a function of that frame, so a run that is taken up there
-    /// takes the same way.
-    ///
-    /// No particle has moved by more than `moved` (length) since the last solution.
-    fn solve(&mut self, moved: f64) -> Result<(), ContactError> {
-        let mut due = self.due(self.f_max);
-        self.law.solve_within(&self.packing, due, moved)?;
-        self.balance();
-        // The full tolerance, due at 0, keeps every promise; a frame that might be the last is always solved to it.
-        while due > 0.0
-            && (self.due(self.f_max) == 0.0 || self.law.residual() > self.promised_residual())
-        {
-            due = if self.f_max < due {
-                self.due(0.5 * self.f_max)
-            } else {
-                0.0
-            };
-            self.law.tighten(&self.packing, due)?;
-            self.balance();
-        }
-        Ok(())
-    }
-
-    /// The `f_max` that the tolerance follows: 0, for the full tolerance, in a frame that might be the last.
-    fn due(&self, f_max: f64) -> f64 {
-        if f_max > self.threshold { f_max } else { 0.0 }
-    }
-
-    /// The residual of the contact law that this frame keeps to, relative to the largest `|δ|` of its contacts: sixteen
-    /// times the [tolerance](crate::models::droplet::contact::due_tolerance) at its `f_max`, at the full tolerance if `f_max` is not above the
-    /// threshold.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.law().residual() <= run.promised_residual());
-    /// ```
+    /// The residual that this frame keeps to, relative to the largest `|δ|` of its contacts; see
+    /// [`Model::promised_residual`].
     #[must_use]
     pub fn promised_residual(&self) -> f64 {
-        let due = self.due(self.f_max);
-        ACCEPTED * self.law.tolerance_at(&self.packing, due)
-    }
-
-    fn balance(&mut self) {
-        self.judgement.take();
-        self.form
-            .evaluate_law(&self.law, &self.packing, &mut self.net);
-        self.f_max = largest_force(&self.net) / self.law.line_tension();
+        self.model.promised_residual(&self.packing, self.threshold)
     }
 
     /// Whether `f_max` is not above the threshold, and the contact law is fulfilled.
     fn is_balanced(&self) -> bool {
-        self.f_max <= self.threshold && self.law.residual() <= self.law.accepted_residual()
+        self.f_max() <= self.threshold && self.model.residual() <= self.model.accepted_residual()
     }
 
     /// Whether a frame in balance is a minimum or a saddle; `None` while it is not in balance.
@@ -367,7 +317,7 @@ impl Relaxation {
     /// See the example of [`Stability`].
     #[must_use]
     pub fn stability(&self) -> Option<Stability> {
-        let judge = || judge(&self.packing, &self.law, self.form.form(), self.f_max);
+        let judge = || judge(&self.packing, &self.model);
         self.is_balanced()
             .then(|| self.judgement.get_or_init(judge).stability)
     }
@@ -413,9 +363,3 @@ impl Iterator for Relaxation {
 
 /// How far a step down from a saddle takes the particle that moves most, in units of the smallest radius.
 const LEAVE: f64 = 0.02;
-
-/// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Geometric means of the steps
-/// with 1.0, 1.2 and 1.3 (the first with α_start = 0.25, the others with 0.1), N = 1024: 3184, 2654, 2573 at φ = 0.86 (96 seeds);
-/// 6293, 4817, 4641 at 0.845, 1322, 1150, 1102 at 0.90, and 672, 690, 659 at 0.95 (24 seeds). With α_start = 0.25, 1.4 takes twice
-/// as many as 1.2.
-const DT_MAX_TIMES_OMEGA: f64 = 1.2;

@@ -1,11 +1,12 @@
 //! What a run is at its present frame.
 
 use super::Relaxation;
+use super::disks::DiskReport;
 use crate::analysis::{Backbone, Observables};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
-use crate::models::disks::DiskReport;
 use crate::models::droplet::contact::ContactLaw;
+use crate::models::{AnyModel, Model};
 use crate::state::Frame;
 use crate::state::Packing;
 
@@ -37,8 +38,8 @@ impl Relaxation {
         frame.step = self.step;
         self.packing.positions().clone_into(&mut frame.positions);
         self.velocities.clone_into(&mut frame.velocities);
-        self.law
-            .copy_contacts(&mut frame.contacts, &mut frame.forces);
+        let (pairs, forces) = (&mut frame.contacts, &mut frame.forces);
+        self.model.copy_contacts(&self.packing, pairs, forces);
         frame.minimizer = self.state;
     }
 
@@ -63,7 +64,7 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn contacts(&self) -> Contacts<'_> {
-        self.law.contacts()
+        self.model.contacts(&self.packing)
     }
 
     /// The net forces `F_i`, one a particle (force; `line_tension` is in the same unit).
@@ -76,7 +77,7 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn net_forces(&self) -> &[Vec2] {
-        &self.net
+        self.model.net_forces()
     }
 
     /// Number of moves made.
@@ -112,7 +113,7 @@ impl Relaxation {
     /// ```
     #[must_use]
     pub fn f_max(&self) -> f64 {
-        self.f_max
+        self.model.f_max()
     }
 
     /// Balance, energy, stress and coordination at this frame.
@@ -131,29 +132,22 @@ impl Relaxation {
     ///
     /// See the example of [`Backbone`].
     pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
-        let f_max_and_dt = (self.f_max, self.state.dt);
-        let o = Observables::of_law(&self.law, &self.packing, f_max_and_dt, backbone);
-        if self.form.torques().is_empty() {
-            return o;
-        }
-        o.with_torques(
-            &self.law.contacts(),
-            self.packing.domain(),
-            self.law.line_tension(),
-            self.form.torques(),
-        )
+        Observables::of_model(&self.model, &self.packing, self.state.dt, backbone)
     }
 
-    /// The contact law with its residual and its count of work.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.law().residual() <= run.law().accepted_residual());
-    /// ```
+    /// The model with its residual.
     #[must_use]
-    pub fn law(&self) -> &ContactLaw {
-        &self.law
+    pub fn model(&self) -> &AnyModel {
+        &self.model
+    }
+
+    /// The contact law of droplets with its residual and its count of work; `None` with another model.
+    #[must_use]
+    pub fn law(&self) -> Option<&ContactLaw> {
+        match &self.model {
+            AnyModel::MorseWitten(droplets) => Some(droplets.law()),
+            AnyModel::Disks(_) => None,
+        }
     }
 
     /// How the undeformed disks relaxed; `None` where there was no such stage (a start from a file, a resumed run).

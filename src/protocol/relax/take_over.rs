@@ -1,6 +1,7 @@
 //! A run that goes on under another scene.
 
 use super::{RelaxError, Relaxation};
+use crate::models::{Goal, Model};
 use crate::scene::Scene;
 use crate::state::Frame;
 use crate::state::Packing;
@@ -31,11 +32,10 @@ impl Relaxation {
     pub fn take_over(scene: &Scene, packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
         let step = frame.step;
         let mut run = Self::resume(scene, packing, frame)?;
-        if run.law.residual() > run.promised_residual() {
-            run.law
-                .solve_within(&run.packing, 0.0, f64::INFINITY)
+        if run.model.residual() > run.promised_residual() {
+            run.model
+                .solve(&run.packing, Goal::EXACT)
                 .map_err(|source| RelaxError::Contact { step, source })?;
-            run.balance();
         }
         Ok(run)
     }

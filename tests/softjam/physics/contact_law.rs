@@ -170,7 +170,7 @@ fn answer_from_the_step_before_is_the_answer_from_nothing() {
             worst = worst.max(largest_difference(&answer(&warm), &answer(&cold)));
             // The run itself solves no more exactly than its frame promises.
             let strongest = cold.contacts().forces.iter().copied().fold(0.0, f64::max);
-            let difference = difference_with_absent(&answer(run.law()), &answer(&cold));
+            let difference = difference_with_absent(&answer(run.law().unwrap()), &answer(&cold));
             of_promise = of_promise.max(difference / strongest / run.promised_residual());
         }
     }

@@ -104,7 +104,7 @@ fn condition_number_of_relaxed_packings_is_about_six() {
         (0.90, 2),
     ] {
         let run = converged(&scene(256, phi, seed));
-        let matrix = run.law().matrix();
+        let matrix = run.law().unwrap().matrix();
         let largest = largest_eigenvalue(matrix.len(), |x| {
             let mut y = vec![0.0; x.len()];
             matrix.multiply(x, &mut y);

@@ -18,10 +18,10 @@ use crate::common::Random;
 use families::Case;
 use softjam::analysis::Stability;
 use softjam::domain::{Domain, Vec2};
-use softjam::models::disks;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::Form;
 use softjam::models::droplet::contact::{ContactError, ContactLaw};
+use softjam::protocol::relax_disks;
 use softjam::scene::Scene;
 use softjam::state::Packing;
 use verify::Answer;
@@ -108,7 +108,7 @@ fn in_strips_and_around_intruders_no_second_image_is_missed() {
             steps: 40,
             ..DiskParameters::default()
         };
-        disks::relax(&mut packing, &parameters, 1.0);
+        relax_disks(&mut packing, &parameters, 1.0).unwrap();
         let outcome = outcome::of_packing(&Scene::default(), &packing);
         assert!(outcome.wrong.is_none(), "{case}: {outcome:?}");
         let too_small = outcome.end == "box too small";

@@ -397,7 +397,7 @@ mod tests {
                 ..Scene::default()
             };
             let run = Relaxation::new(&scene).unwrap();
-            let (matrix, overlaps) = (run.law().matrix(), run.contacts().overlaps);
+            let (matrix, overlaps) = (run.law().unwrap().matrix(), run.contacts().overlaps);
             let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
             for tolerance in [1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13] {
                 let far_above_round_off = tolerance > 1e-10;
