@@ -29,14 +29,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         shape: Shape::Disk,
         ..plain
     };
-    let a = packing(run.packing(), &run.frame(), scene.line_tension, &disks);
+    let a = packing(run.packing(), &run.frame(), &scene, &disks);
     write(folder.join("figure5a.svg"), &a)?;
 
     // (b) The packing in mechanical equilibrium.
     while run.status() == Status::Running {
         run.advance()?;
     }
-    let b = packing(run.packing(), &run.frame(), scene.line_tension, &plain);
+    let b = packing(run.packing(), &run.frame(), &scene, &plain);
     write(folder.join("figure5b.svg"), &b)?;
     Ok(())
 }

@@ -1,14 +1,12 @@
 //! The forces of a frame that comes from a file, or from anywhere else.
 
 use super::{Backbone, Observables};
-use crate::contacts::FrameContacts;
-use crate::contacts::largest_force;
 use crate::domain::Vec2;
-use crate::models::droplet::{Form, NetForces};
+use crate::models::{AnyModel, Model};
 use crate::state::Frame;
 use crate::state::Packing;
 
-/// Net forces, torques and observables of a frame, in either [form](Form): the bits of the run that it comes from.
+/// Net forces, torques and observables of a frame, whatever its model: the bits of the run that it comes from.
 ///
 /// # Example
 ///
@@ -32,7 +30,7 @@ use crate::state::Packing;
 /// let frame = last.unwrap();
 /// let packing = recording.packing(&frame).unwrap();
 /// let scene = recording.scene();
-/// let forces = FrameForces::of(&packing, &frame, scene.line_tension, scene.forces);
+/// let forces = FrameForces::of(&packing, &frame, scene.model());
 /// assert_eq!(forces.net().len(), 32);
 /// assert!(forces.observables().f_max <= scene.threshold);
 /// # std::fs::remove_file(&path).unwrap();
@@ -46,8 +44,8 @@ pub struct FrameForces {
 }
 
 impl FrameForces {
-    /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `line_tension` is γ (force), `form`
-    /// the scene's [`forces`](crate::scene::Scene::forces).
+    /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `model` is the
+    /// [scene's](crate::scene::Scene::model).
     ///
     /// # Panics
     ///
@@ -58,36 +56,20 @@ impl FrameForces {
     ///
     /// let scene = Scene { particles: 32, phi: 0.9, forces: Form::Gradient, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();
-    /// let forces = FrameForces::of(run.packing(), &run.frame(), scene.line_tension, scene.forces);
+    /// let forces = FrameForces::of(run.packing(), &run.frame(), scene.model());
     /// assert_eq!(forces.net(), run.net_forces());
     /// assert_eq!(forces.observables(), &run.observables());
     /// ```
     #[must_use]
-    pub fn of(packing: &Packing, frame: &Frame, line_tension: f64, form: Form) -> Self {
-        let contacts = FrameContacts::of(packing, frame);
-        let contacts = contacts.view();
-        let mut forces = NetForces::new(form);
-        let mut net = vec![Vec2::zeros(); packing.len()];
-        forces.evaluate(&contacts, packing, line_tension, &mut net);
-        let torques = forces.torques().to_vec();
-        let f_max = largest_force(&net) / line_tension;
-        let observables = Observables::counted(
-            &contacts,
-            packing.domain(),
-            packing.len(),
-            line_tension,
-            (f_max, frame.minimizer.dt),
-            &mut Backbone::default(),
-        );
-        let observables = if torques.is_empty() {
-            observables
-        } else {
-            observables.with_torques(&contacts, packing.domain(), line_tension, &torques)
-        };
+    pub fn of(packing: &Packing, frame: &Frame, mut model: AnyModel) -> Self {
+        let mut packing = packing.clone();
+        frame.positions.clone_into(packing.positions_mut());
+        model.restore(&packing, &frame.contacts, &frame.forces);
+        let dt = frame.minimizer.dt;
         Self {
-            net,
-            torques,
-            observables,
+            net: model.net_forces().to_vec(),
+            torques: model.torques().to_vec(),
+            observables: Observables::of_model(&model, &packing, dt, &mut Backbone::default()),
         }
     }
 
@@ -100,14 +82,6 @@ impl FrameForces {
     }
 
     /// The torque `τ_c` of each contact (force·length); empty for the central form.
-    ///
-    /// ```
-    /// use softjam::{analysis::FrameForces, models::droplet::Form, protocol::Relaxation, scene::Scene};
-    ///
-    /// let run = Relaxation::new(&Scene { particles: 32, phi: 0.9, ..Scene::default() }).unwrap();
-    /// let torques = |form| FrameForces::of(run.packing(), &run.frame(), 1.0, form).torques().len();
-    /// assert_eq!((torques(Form::Central), torques(Form::Gradient)), (0, run.contacts().pairs.len()));
-    /// ```
     #[must_use]
     pub fn torques(&self) -> &[f64] {
         &self.torques

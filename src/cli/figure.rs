@@ -264,6 +264,5 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
         range: arguments.range,
     };
     let packing = recording.packing(&frame)?;
-    let line_tension = recording.scene().line_tension;
-    Ok(figure::packing(&packing, &frame, line_tension, &style))
+    Ok(figure::packing(&packing, &frame, recording.scene(), &style))
 }

@@ -60,6 +60,10 @@ pub struct SceneFlags {
     #[arg(long, value_name = "STEPS", value_parser = whole, allow_negative_numbers = true, help_heading = RELAXATION)]
     steps: Option<i128>,
 
+    /// Model of the particles: morse-witten (droplets) or disks (undeformed, f = k δ) [default: morse-witten].
+    #[arg(long, value_name = "MODEL", value_parser = named::<softjam::models::Kind>, help_heading = PACKING)]
+    model: Option<softjam::models::Kind>,
+
     /// Minimiser: fire, or fire+newton (FIRE through the rearrangements, then Newton's method) [default: fire].
     #[arg(long, value_name = "MINIMIZER", value_parser = named::<softjam::scene::Minimizer>, help_heading = RELAXATION)]
     minimizer: Option<softjam::scene::Minimizer>,
@@ -175,6 +179,7 @@ impl SceneFlags {
             line_tension: self.line_tension,
             threshold: self.threshold,
             steps: self.steps,
+            model: self.model,
             minimizer: self.minimizer,
             forces: self.forces,
             dt_max: self.dt_max,

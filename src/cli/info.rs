@@ -118,7 +118,7 @@ impl Findings {
         let last = self.last.as_ref()?;
         let packing = recording.packing(last).ok()?;
         let scene = recording.scene();
-        let forces = FrameForces::of(&packing, last, scene.line_tension, scene.forces);
+        let forces = FrameForces::of(&packing, last, scene.model());
         Some(*forces.observables())
     }
 
@@ -127,8 +127,8 @@ impl Findings {
         let last = self.last.as_ref()?;
         let packing = recording.packing(last).ok()?;
         let contacts = FrameContacts::of(&packing, last);
-        let line_tension = recording.scene().line_tension;
-        Some(Validity::of(&contacts.view(), packing.len(), line_tension))
+        let scene = recording.scene();
+        (scene.model).validity(&contacts.view(), packing.len(), scene.line_tension)
     }
 }
 
@@ -332,7 +332,7 @@ fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Valu
         "file": shown(path),
         "program": recording.program(),
         "bits": recording.bits(),
-        "model": table::MODEL,
+        "model": recording.scene().model.name(),
         "particles": recording.radii().len(),
         "phi": recording.coverage(),
         "seed": table::seed(recording),

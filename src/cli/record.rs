@@ -10,8 +10,6 @@ use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use softjam::BITS;
 use softjam::analysis::Observables;
 use softjam::analysis::Stability;
-use softjam::models::Model;
-use softjam::models::droplet::validity::Validity;
 use softjam::numerics::threads;
 use softjam::protocol::{Relaxation, Status};
 use softjam::record::{self, Header, Leg, RecordError, Summary, Writer};
@@ -166,8 +164,9 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
         (disks, start.elapsed()),
     ))?;
     live.finish(summary.outcome)?;
-    let validity = Validity::of(&run.contacts(), run.packing().len(), scene.line_tension);
-    if let Some(warning) = validity.warning() {
+    let particles = run.packing().len();
+    let validity = (scene.model).validity(&run.contacts(), particles, scene.line_tension);
+    if let Some(warning) = validity.and_then(|v| v.warning()) {
         warn(&warning);
     }
     Ok(match summary.outcome {
@@ -539,13 +538,13 @@ fn report(
     );
     lines.line("pressure", format!("{:.6e} γ/length", o.pressure()));
     lines.line("energy", format!("{:.6e} γ·length", o.energy));
-    lines.line(
-        "contact law",
-        format!(
-            "residual {:.1e} of the largest overlap",
-            run.model().residual()
-        ),
-    );
+    if let Some(law) = run.law() {
+        let residual = law.residual();
+        lines.line(
+            "contact law",
+            format!("residual {residual:.1e} of the largest overlap"),
+        );
+    }
     let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);
     // Without disks it is the time of the first contact problem.
     let before = run.disks().map_or("start", |_| "disks");

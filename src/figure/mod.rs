@@ -8,7 +8,7 @@
 //!
 //! let scene = Scene { particles: 32, phi: 0.95, ..Scene::default() };
 //! let run = Relaxation::new(&scene).unwrap();
-//! let svg = packing(run.packing(), &run.frame(), scene.line_tension, &Style::default());
+//! let svg = packing(run.packing(), &run.frame(), &scene, &Style::default());
 //! assert!(svg.starts_with("<svg"));
 //! let path = std::env::temp_dir().join("softjam-figure-example.png");
 //! softjam::figure::write(&path, &svg).unwrap();

@@ -7,7 +7,7 @@ use crate::contacts::{Contacts, FrameContacts};
 use crate::contacts::{largest_force, net_forces};
 use crate::domain::{Domain, Vec2};
 use crate::models::droplet::contour::{ContourStyle, Contours, Placement};
-use crate::models::droplet::validity::Validity;
+use crate::scene::Scene;
 use crate::state::Frame;
 use crate::state::Packing;
 use crate::text::counted;
@@ -92,19 +92,20 @@ const STRONGEST: f64 = 3.0;
 /// The width of an outline, likewise.
 const OUTLINE: (f64, f64) = (0.03, 1.2);
 
-/// Draws `frame`; `packing` gives radii and box, `line_tension` is γ (force).
+/// Draws `frame` of a run of `scene`; `packing` gives radii and box.
 ///
 /// Below the packing stand its numbers, what colours and lines mean, and, where more of the model is shown than positions, the
-/// [warning](Validity::warning) of a packing that is beyond the model's range.
+/// [warning](crate::models::droplet::validity::Validity::warning) of a packing that is beyond the model's range.
 ///
 /// See the example of the [module](super).
 #[must_use]
-pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Style) -> String {
+pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -> String {
+    let line_tension = scene.line_tension;
     let contacts = FrameContacts::of(packing, frame);
     let contacts = contacts.view();
     let sheet = Sheet::of(packing.domain(), style.width);
     let radius = mean(packing.radii());
-    let mut contours = Contours::new(ContourStyle {
+    let mut contours = scene.model.contours(ContourStyle {
         vertices: vertices(sheet.scale * radius),
         placement: Placement::Contacts,
     });
@@ -135,8 +136,8 @@ pub fn packing(packing: &Packing, frame: &Frame, line_tension: f64, style: &Styl
     }
     let of_the_model =
         style.shape == Shape::Contour || chains.is_some() || style.color != ColorBy::Nothing;
-    let validity = Validity::of(&contacts, packing.len(), line_tension);
-    if let Some(warning) = validity.warning().filter(|_| of_the_model) {
+    let validity = scene.model.validity(&contacts, packing.len(), line_tension);
+    if let Some(warning) = validity.and_then(|v| v.warning()).filter(|_| of_the_model) {
         let words: Vec<String> = warning.split(' ').map(str::to_owned).collect();
         legend.lines(&words, " ", 0.75);
     }

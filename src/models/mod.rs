@@ -20,15 +20,19 @@
 //! }
 //! ```
 
+mod check;
 pub mod disks;
 pub mod droplet;
 
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
-use crate::state::Packing;
+use crate::state::{Frame, Packing};
+pub use check::Check;
 use disks::Disks;
 use droplet::MorseWitten;
 use droplet::contact::ContactError;
+use droplet::contour::{ContourStyle, Contours};
+use droplet::validity::Validity;
 
 /// What a model has to give.
 ///
@@ -78,6 +82,15 @@ pub trait Model {
     ///
     /// [`ContactError`] if a linear system is not solved.
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError>;
+
+    /// The residual, relative to its largest `|δ|`, that a frame promises whose balance is asked for to `threshold` (units of γ).
+    ///
+    /// `packing` has the positions of `frame` here and in [`check`](Self::check).
+    fn promise(&self, packing: &Packing, frame: &Frame, threshold: f64) -> f64;
+
+    /// What a frame's contacts and forces are worth. It shares nothing with [`solve`](Self::solve) but the formulas of the paper, and
+    /// does not look at what was solved before.
+    fn check(&self, packing: &Packing, frame: &Frame, threshold: f64) -> Check;
 }
 
 /// How exactly a model is to be solved.
@@ -128,6 +141,28 @@ impl Kind {
             Self::MorseWitten => "morse-witten",
             Self::Disks => "disks",
         }
+    }
+}
+
+impl Kind {
+    /// The contours that particles of this model have: those of disks stay circles.
+    #[must_use]
+    pub fn contours(self, style: ContourStyle) -> Contours {
+        match self {
+            Self::MorseWitten => Contours::new(style),
+            Self::Disks => Contours::circles(style),
+        }
+    }
+
+    /// How far these contacts strain a model that is linear in its forces; `None` for disks, whose law is meant as it stands.
+    #[must_use]
+    pub fn validity(
+        self,
+        contacts: &Contacts<'_>,
+        particles: usize,
+        line_tension: f64,
+    ) -> Option<Validity> {
+        (self == Self::MorseWitten).then(|| Validity::of(contacts, particles, line_tension))
     }
 }
 
@@ -198,5 +233,13 @@ impl Model for AnyModel {
 
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
         each!(self, model => model.longest_time_step(packing))
+    }
+
+    fn promise(&self, packing: &Packing, frame: &Frame, threshold: f64) -> f64 {
+        each!(self, model => model.promise(packing, frame, threshold))
+    }
+
+    fn check(&self, packing: &Packing, frame: &Frame, threshold: f64) -> Check {
+        each!(self, model => model.check(packing, frame, threshold))
     }
 }

@@ -3,6 +3,7 @@
 use super::columns::array;
 use super::encode::Encoder;
 use super::{FORMAT_VERSION, Header, legend, legs_to_text};
+use crate::models::Kind;
 use crate::models::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
 use crate::text::{counted, length, shown};
@@ -138,11 +139,18 @@ fn text(header: &Header) -> String {
             }
         ),
     };
+    let (model, particle) = match scene.model {
+        Kind::MorseWitten => ("Morse–Witten model", "deformable particle"),
+        Kind::Disks => (
+            "Undeformed disks, f = k δ with k = 4πγ / 3(R_i + R_j)",
+            "disk",
+        ),
+    };
     let mut parts = vec![format!(
         "**{} at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
-         {} × {}. Morse–Witten model, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
+         {} × {}. {model}, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
          {}.\n\n",
-        counted(packing.len(), "deformable particle"),
+        counted(packing.len(), particle),
         packing.coverage(),
         length(l.x),
         length(l.y),
@@ -172,19 +180,25 @@ fn text(header: &Header) -> String {
         parts.push("| in the picture | |\n| --- | --- |\n".to_owned());
     }
     if channels.contours.is_on() {
-        parts.push("| outline | contour ρ(θ) of a particle; thin and dim: periodic image of one that crosses the edge |\n\
+        let outline = match scene.model {
+            Kind::MorseWitten => "contour ρ(θ) of a particle",
+            Kind::Disks => "edge of a disk",
+        };
+        parts.push(format!("| outline | {outline}; thin and dim: periodic image of one that crosses the edge |\n\
              | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
              | gray | rattler: fewer than three contacts that bear a force |\n\
              | what fills it | hover it for its number, p (γ/length), number of contacts Z, deepest dent −ΔR/R |\n\
-             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n".to_owned());
+             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n"));
     }
     if channels.contacts.is_on() {
         parts.push("| line | contact; width and colour: force f over the mean (inferno, 0 to 3); click it for its pair, f (γ) and overlap δ |\n".to_owned());
     }
-    parts.push(format!(
+    if scene.model == Kind::MorseWitten {
+        parts.push(format!(
         "\n**Validity.** The model is linear in the forces: on a particle that is squeezed beyond Σ f / 2πγ = {SQUEEZE_LIMIT} they fall short of a \
          real droplet's by more than 10 %. In mixtures that begins near φ = 0.86; `softjam info` tells how many particles are beyond it.\n"
     ));
+    }
     parts.push(format!(
         "\nThe whole scene:\n\n```toml\n{}```\n",
         scene.to_toml()

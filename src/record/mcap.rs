@@ -150,7 +150,7 @@ impl<W: Write> McapRecorder<W> {
             writer,
             sink,
             line_tension: header.scene.line_tension,
-            contours: Contours::new(header.scene.contours),
+            contours: header.scene.model.contours(header.scene.contours),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, CHUNK_MOVES),
             packing: header.packing,

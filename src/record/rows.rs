@@ -64,7 +64,7 @@ impl Rows {
     pub fn new(header: Header) -> Self {
         Self {
             line_tension: header.scene.line_tension,
-            contours: Contours::new(header.scene.contours),
+            contours: header.scene.model.contours(header.scene.contours),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, BATCH_MOVES),
             begun: false,

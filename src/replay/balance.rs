@@ -1,22 +1,12 @@
 //! Is the recorded packing in force balance, and do its contacts fulfil the contact law?
 //!
-//! Each recorded frame is judged from its positions and the radii alone: the contact problem is solved anew, from no guess,
-//! and what comes out is compared with what was recorded. That the forces solve `A f = δ` and that no other pair overlaps
-//! is checked by sums of its own over a freshly assembled `A`, not by the solver's word.
+//! Each recorded frame is held against the law of its model by [`Model::check`], from positions, radii and forces alone and by no solver.
 
-use crate::analysis::Observables;
-use crate::contacts::FrameContacts;
-use crate::contacts::largest_force;
-use crate::domain::Vec2;
-use crate::models::droplet::NetForces;
-use crate::models::droplet::contact::list::ContactList;
-use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
-use crate::models::droplet::contact::solver::Method;
-use crate::models::droplet::contact::{ACCEPTED, ContactError, ContactLaw, Rule, due_tolerance};
+use crate::models::droplet::contact::Rule;
+use crate::models::{AnyModel, Model};
 use crate::record::Outcome;
 use crate::scene::Scene;
-use crate::state::Frame;
-use crate::state::Packing;
+use crate::state::{Frame, Packing};
 
 /// The worst of each residual over the frames, with the step at which it occurred.
 ///
@@ -64,16 +54,6 @@ impl Worst {
     }
 }
 
-/// What the residuals of a frame may be.
-#[derive(Clone, Copy)]
-struct Allowed {
-    step: u64,
-    /// Of lengths: what its `f_max` promises.
-    lengths: f64,
-    /// Of forces, which a matrix of condition 6 amplifies.
-    forces: f64,
-}
-
 /// What the frames seen so far are worth.
 ///
 /// # Example
@@ -89,11 +69,9 @@ struct Allowed {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Balance {
-    law: ContactLaw,
-    form: NetForces,
+    model: AnyModel,
     rule: Rule,
     threshold: f64,
-    tolerance: f64,
     /// `max |A f − δ|` of the recorded forces: Saitoh (4).
     pub equation_4: Worst,
     /// The same of the last frame alone.
@@ -102,18 +80,12 @@ pub struct Balance {
     pub overlap: Worst,
     /// The largest pull `−f` among the recorded forces; `f · gap = 0` since contacts have no gap and no other pair has a force.
     pub pull: Worst,
-    /// The largest difference between recorded forces and those of the contact problem solved anew.
-    pub forces: Worst,
-    /// The largest relative difference between recorded energy, pressure and those of the contact problem solved anew.
+    /// The largest relative difference between recorded energy, pressure and those of the recorded forces.
     pub energy_and_pressure: Worst,
-    /// Pairs that are contacts on one side only.
-    pub contacts: Worst,
     /// Frames seen.
     pub frames: u64,
     /// The step of the last frame, and its `f_max` from positions alone (units of γ).
     pub last: Option<(u64, f64)>,
-    /// The first frame whose contact problem had no answer.
-    pub failed: Option<(u64, ContactError)>,
 }
 
 /// How far a residual may always be from zero: round-off, and the full tolerance amplified by a matrix of condition 6.
@@ -131,27 +103,16 @@ impl Balance {
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         Self {
-            law: ContactLaw::new(
-                Rule::Complementarity,
-                // The answer is unique, and not every solver is fit for every number of contacts.
-                Method::ConjugateGradient,
-                scene.line_tension,
-                scene.contact_tolerance.min(1e-12),
-            ),
-            form: NetForces::new(scene.forces),
+            model: scene.model(),
             rule: scene.contact_rule,
             threshold: scene.threshold,
-            tolerance: scene.contact_tolerance,
             equation_4: Worst::default(),
             last_equation_4: 0.0,
             overlap: Worst::default(),
             pull: Worst::default(),
-            forces: Worst::default(),
             energy_and_pressure: Worst::default(),
-            contacts: Worst::default(),
             frames: 0,
             last: None,
-            failed: None,
         }
     }
 
@@ -164,146 +125,26 @@ impl Balance {
     /// See the example of [`Balance`].
     pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
+        let found = self.model.check(packing, frame, self.threshold);
         self.frames += 1;
-        let recorded = FrameContacts::of(packing, frame);
-        let view = recorded.view();
-        let scale = view.overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
-        let mut net = vec![Vec2::zeros(); packing.len()];
-        let gamma = self.law.line_tension();
-        self.form.evaluate(&view, packing, gamma, &mut net);
-        let f_max = largest_force(&net) / gamma;
-        self.last = Some((step, f_max));
-        let allowed = self.allowed(packing, view.overlaps, f_max, step);
-        // Eq. (4), row by row.
-        if let Some(list) = ContactList::new(packing.len(), view.pairs) {
-            let geometry = Geometry::of(packing, &list);
-            let gamma = self.law.line_tension();
-            let matrix = ContactMatrix::of(packing, &list, &geometry, gamma);
-            self.last_equation_4 = 0.0;
-            for (c, delta) in view.overlaps.iter().enumerate() {
-                let row: f64 = matrix.row(c).map(|(k, a)| a * view.forces[k]).sum();
-                let residual = matrix.diagonal()[c] * view.forces[c] + row - delta;
-                let residual = relative(residual.abs());
-                self.equation_4.of(residual, allowed.lengths, step);
-                self.last_equation_4 = self.last_equation_4.max(residual);
-            }
-            self.check_gaps(packing, &list, &geometry, view.forces, scale, allowed);
-        }
-        let strongest = view.forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-        for f in view.forces {
-            let pull = if strongest > 0.0 { -f / strongest } else { -f };
-            self.pull.of(pull, 0.0, step);
-        }
-        match self.law.solve(packing, &[], &[]) {
-            Ok(()) => {
-                self.compare(view.pairs, view.forces, strongest, allowed);
-                self.compare_metrics(packing, metrics, allowed);
-            }
-            Err(error) => self.failed = self.failed.take().or(Some((step, error))),
-        }
-    }
-
-    /// What the frame's `f_max` promises.
-    fn allowed(&self, packing: &Packing, overlaps: &[f64], f_max: f64, step: u64) -> Allowed {
-        let due = if f_max > self.threshold && self.rule == Rule::Complementarity {
-            f_max
-        } else {
-            0.0
-        };
-        let promised = ACCEPTED * due_tolerance(packing, overlaps, due, self.tolerance);
+        self.last = Some((step, found.f_max));
+        self.last_equation_4 = found.residual;
+        let lengths = found.promised.max(ALLOWED);
         let ratio = packing.largest_radius() / packing.smallest_radius();
-        Allowed {
-            step,
-            lengths: promised.max(ALLOWED),
-            forces: (AMPLIFIED * ratio * promised).max(ALLOWED),
-        }
-    }
-
-    /// Every pair of particles whose contours could meet, whether or not any list names it.
-    fn check_gaps(
-        &mut self,
-        packing: &Packing,
-        list: &ContactList,
-        geometry: &Geometry,
-        forces: &[f64],
-        scale: f64,
-        allowed: Allowed,
-    ) {
-        let gamma = self.law.line_tension();
-        let mut neighbors = crate::neighbors::NeighborList::new();
-        // Wider bulges than the largest particle is large are left to the comparison with the forces found anew.
-        neighbors.update(packing, 2.0 * packing.largest_radius(), 0.0);
-        for &[i, j] in neighbors.pairs() {
-            if list.partners(i as usize).binary_search(&j).is_err() {
-                let gap = geometry.gap(packing, gamma, forces, i as usize, j as usize);
-                let overlap = if scale > 0.0 { -gap / scale } else { -gap };
-                self.overlap.of(overlap, allowed.lengths, allowed.step);
-            }
-        }
-    }
-
-    /// Recorded contacts and forces against those found anew.
-    fn compare(&mut self, pairs: &[[u32; 2]], forces: &[f64], strongest: f64, allowed: Allowed) {
-        let anew = self.law.contacts();
-        let (mut a, mut b) = (0, 0);
-        let (mut lonely, mut worst): (u64, f64) = (0, 0.0);
-        let relative = |x: f64| {
-            if strongest > 0.0 {
-                x.abs() / strongest
-            } else {
-                x.abs()
-            }
-        };
-        while a < pairs.len() || b < anew.pairs.len() {
-            let (p, q) = (pairs.get(a), anew.pairs.get(b));
-            match (p, q) {
-                (Some(p), Some(q)) if p == q => {
-                    worst = worst.max(relative(forces[a] - anew.forces[b]));
-                    (a, b) = (a + 1, b + 1);
-                }
-                (Some(p), q) if q.is_none_or(|q| p < q) => {
-                    worst = worst.max(relative(forces[a]));
-                    lonely += u64::from(relative(forces[a]) > allowed.forces);
-                    a += 1;
-                }
-                _ => {
-                    worst = worst.max(relative(anew.forces[b]));
-                    lonely += u64::from(relative(anew.forces[b]) > allowed.forces);
-                    b += 1;
-                }
-            }
-        }
-        self.forces.of(worst, allowed.forces, allowed.step);
-        self.contacts.of(lonely as f64, 0.0, allowed.step);
-    }
-
-    /// Recorded energy and pressure against those of the contacts found anew.
-    fn compare_metrics(
-        &mut self,
-        packing: &Packing,
-        metrics: &[(&'static str, f64)],
-        allowed: Allowed,
-    ) {
-        let (domain, gamma) = (packing.domain(), self.law.line_tension());
-        let anew = Observables::of(
-            &self.law.contacts(),
-            domain,
-            packing.len(),
-            gamma,
-            (0.0, 0.0),
-        );
+        let forces = (AMPLIFIED * ratio * found.promised).max(ALLOWED);
+        self.equation_4.of(found.residual, lengths, step);
+        self.overlap.of(found.overlap, lengths, step);
+        self.pull.of(found.pull, 0.0, step);
         for (name, recorded) in metrics {
             let value = match *name {
-                "energy" => anew.energy,
-                "pressure" => anew.pressure(),
+                "energy" => found.energy,
+                "pressure" => found.pressure,
                 _ => continue,
             };
             let scale = value.abs().max(recorded.abs());
             if scale > 0.0 || recorded.is_nan() {
                 let difference = (value - recorded).abs() / scale;
-                self.energy_and_pressure
-                    .of(difference, allowed.forces, allowed.step);
+                self.energy_and_pressure.of(difference, forces, step);
             }
         }
     }
@@ -317,13 +158,10 @@ impl Balance {
         let last = self.last.map_or(0, |(step, _)| step);
         let within =
             |worst: &Worst| worst.agrees() || (self.rule == Rule::Saitoh && worst.step != last);
-        self.failed.is_none()
-            && within(&self.equation_4)
+        within(&self.equation_4)
             && within(&self.overlap)
             && within(&self.pull)
-            && within(&self.forces)
             && within(&self.energy_and_pressure)
-            && within(&self.contacts)
     }
 
     /// Whether the last frame bears out a result: a converged run ends with `f_max` not above its threshold. The recorded `f_max` may be

@@ -5,11 +5,7 @@
 
 use super::balance::{AMPLIFIED, Worst};
 use super::walk::Segment;
-use crate::contacts::FrameContacts;
-use crate::contacts::largest_force;
-use crate::domain::Vec2;
-use crate::models::droplet::NetForces;
-use crate::models::droplet::contact::{ACCEPTED, Rule, due_tolerance};
+use crate::models::Model;
 use crate::protocol::{RelaxError, Relaxation};
 use crate::scene::Scene;
 use crate::state::Frame;
@@ -43,17 +39,7 @@ impl Segment {
 fn promised(scene: &Scene, packing: &Packing, frame: &Frame) -> f64 {
     let mut packing = packing.clone();
     frame.positions.clone_into(packing.positions_mut());
-    let contacts = FrameContacts::of(&packing, frame);
-    let view = contacts.view();
-    let mut net = vec![Vec2::zeros(); packing.len()];
-    NetForces::new(scene.forces).evaluate(&view, &packing, scene.line_tension, &mut net);
-    let f_max = largest_force(&net) / scene.line_tension;
-    let due = if f_max > scene.threshold && scene.contact_rule == Rule::Complementarity {
-        f_max
-    } else {
-        0.0
-    };
-    ACCEPTED * due_tolerance(&packing, view.overlaps, due, scene.contact_tolerance)
+    scene.model().promise(&packing, frame, scene.threshold)
 }
 
 /// How far two frames of one step are apart: positions by the mean radius, forces by the largest.

@@ -45,7 +45,7 @@ fn a_particle_is_drawn_on_every_side_of_the_box_that_it_reaches() {
         let svg = draw(
             &packing,
             &frame_of(&packing),
-            1.0,
+            &Scene::default(),
             &Style {
                 width: 1028.0,
                 ..Style::default()
@@ -83,7 +83,7 @@ fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
             color: ColorBy::Nothing,
             ..Style::default()
         };
-        draw(&packing_of_two, &frame, 1.0, &style)
+        draw(&packing_of_two, &frame, &Scene::default(), &style)
     };
     let rightmost = |svg: &str| {
         let left = &paths(svg)[0];
@@ -119,7 +119,12 @@ fn rattlers_are_pale_and_the_pressed_are_coloured() {
     })
     .unwrap();
     let rattlers = run.observables().rattlers;
-    let svg = draw(run.packing(), &run.frame(), 1.0, &Style::default());
+    let svg = draw(
+        run.packing(),
+        &run.frame(),
+        &Scene::default(),
+        &Style::default(),
+    );
     let pale = svg.matches("#f4f4f4").count();
     assert!(rattlers > 0 && pale >= rattlers, "{pale} of {rattlers}");
     assert!(svg.contains("</tspan> / ⟨"));
@@ -134,7 +139,7 @@ fn drawn(phi: f64, style: &Style) -> String {
         ..Scene::default()
     })
     .unwrap();
-    draw(run.packing(), &run.frame(), 1.0, style)
+    draw(run.packing(), &run.frame(), &Scene::default(), style)
 }
 
 #[test]
@@ -245,7 +250,12 @@ fn a_figure_is_a_picture_of_its_size() {
         ..Scene::default()
     })
     .unwrap();
-    let svg = draw(run.packing(), &run.frame(), 1.0, &Style::default());
+    let svg = draw(
+        run.packing(),
+        &run.frame(),
+        &Scene::default(),
+        &Style::default(),
+    );
     let bytes = png(&svg).unwrap();
     let size = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
     // 640 + two margins, 300 pixels an inch of 96.

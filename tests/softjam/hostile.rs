@@ -464,7 +464,7 @@ fn a_figure_of_whatever_opens_is_drawn_with_numbers_or_refused() {
                     let svg = figure::packing(
                         &packing,
                         &frame,
-                        1.0,
+                        &Scene::default(),
                         &Style {
                             color,
                             shape,

@@ -6,9 +6,6 @@ use softjam::scene::Start;
 use softjam::text::shown;
 use std::fmt::Write as _;
 
-/// The model of the particles, of which there is one.
-pub(super) const MODEL: &str = "morse-witten";
-
 /// The columns, each with the metric that it shows, if it shows one.
 const COLUMNS: [(&str, Option<&str>); 13] = [
     ("file", None),
@@ -54,7 +51,7 @@ impl Row {
                     let stability = found.result.and_then(|end| end.stability);
                     stability.map_or(Cell::Nothing, |s| Cell::Text(s.name().to_owned()))
                 }
-                ("model", _) => Cell::Text(MODEL.to_owned()),
+                ("model", _) => Cell::Text(recording.scene().model.name().to_owned()),
                 ("particles", _) => Cell::Whole(recording.radii().len() as u64),
                 ("phi", _) => Cell::Real(recording.coverage()),
                 ("seed", _) => seed(recording).map_or(Cell::Nothing, Cell::Whole),

@@ -190,7 +190,7 @@ impl Findings {
             None => not
                 .push("the contact law and the balance of forces (--only determinism)".to_owned()),
             Some(b) => checked.push(format!(
-                "contacts, forces and balance, found anew from the positions of {}",
+                "contacts, forces and balance, by the contours alone, of {}",
                 counted(b.frames, "state")
             )),
         }
@@ -358,11 +358,8 @@ impl Findings {
                 "last_equation_4": b.last_equation_4,
                 "overlap": worst(&b.overlap),
                 "pull": worst(&b.pull),
-                "forces": worst(&b.forces),
                 "energy_and_pressure": worst(&b.energy_and_pressure),
-                "contacts": worst(&b.contacts),
                 "f_max": b.last.map(|l| l.1),
-                "failed": b.failed.as_ref().map(|(step, e)| format!("step {step}: {e}")),
             })
         });
         let value = serde_json::json!({
@@ -453,13 +450,6 @@ fn tell_balance(b: &Balance, lines: &mut Lines) {
     );
     lines.line("gaps", format!("overlap elsewhere: {}", at(&b.overlap)));
     lines.line(
-        "forces",
-        format!(
-            "against those found anew, of the largest force: {}",
-            at(&b.forces)
-        ),
-    );
-    lines.line(
         "observables",
         format!(
             "energy and pressure, relative: {}",
@@ -468,16 +458,6 @@ fn tell_balance(b: &Balance, lines: &mut Lines) {
     );
     if b.pull.value > 0.0 {
         lines.line("pulls", at(&b.pull));
-    }
-    if b.contacts.value > 0.0 {
-        let (n, step) = (b.contacts.value, b.contacts.step);
-        lines.line(
-            "contacts",
-            format!("{} on one side only (step {step})", counted(n, "pair")),
-        );
-    }
-    if let Some((step, error)) = &b.failed {
-        lines.line("contact law", format!("step {step}: {error}"));
     }
     if let Some((step, f_max)) = b.last {
         lines.line(

@@ -17,14 +17,15 @@
 //! assert!(run.observables().coordination() > 4.0);
 //! ```
 
+mod check;
 mod forces;
 
-use super::{Goal, Model};
+use super::{Check, Goal, Model};
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::models::droplet::contact::ContactError;
 use crate::neighbors::NeighborList;
-use crate::state::Packing;
+use crate::state::{Frame, Packing};
 use core::f64::consts::PI;
 use forces::Candidates;
 use std::sync::OnceLock;
@@ -181,6 +182,15 @@ impl Model for Disks {
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
         let stiffest = 4.0 * PI * self.line_tension / (6.0 * packing.smallest_radius());
         Ok(DT_MAX / stiffest.sqrt())
+    }
+
+    /// Forces follow from the positions to round-off.
+    fn promise(&self, _: &Packing, _: &Frame, _: f64) -> f64 {
+        0.0
+    }
+
+    fn check(&self, packing: &Packing, frame: &Frame, _: f64) -> Check {
+        self.check_frame(packing, frame)
     }
 }
 

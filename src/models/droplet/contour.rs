@@ -21,7 +21,7 @@
 use super::kernel::{Angles, Direction};
 use super::outline::{Circle, Outline};
 pub(crate) use super::outline::{Extent, Stretch};
-use crate::contacts::Contacts;
+use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -102,6 +102,8 @@ pub struct Contours {
     toward: [Vec<f64>; 3],
     nodes: Vec<[f64; 2]>,
     evaluations: u64,
+    /// Whether forces are passed over.
+    circles: bool,
 }
 
 impl Contours {
@@ -135,6 +137,16 @@ impl Contours {
             toward: Default::default(),
             nodes: Vec::new(),
             evaluations: 0,
+            circles: false,
+        }
+    }
+
+    /// Circles, whatever the forces.
+    #[must_use]
+    pub fn circles(style: ContourStyle) -> Self {
+        Self {
+            circles: true,
+            ..Self::new(style)
         }
     }
 
@@ -176,7 +188,11 @@ impl Contours {
         mut drawn: impl FnMut(&mut Vec<V>, usize, Extent),
     ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
-        self.gather(radii.len(), contacts);
+        if self.circles {
+            self.gather(radii.len(), &FrameContacts::default().view());
+        } else {
+            self.gather(radii.len(), contacts);
+        }
         for (p, (&radius, &centre)) in radii.iter().zip(positions).enumerate() {
             let contacts = &mut self.contacts[self.entry[p]..self.entry[p + 1]];
             let start = vertices.len();

@@ -5,8 +5,8 @@ use super::form::{Form, NetForces};
 use super::frequency::largest_frequency;
 use crate::contacts::{Contacts, largest_force};
 use crate::domain::Vec2;
-use crate::models::{Goal, Model};
-use crate::state::Packing;
+use crate::models::{Check, Goal, Model};
+use crate::state::{Frame, Packing};
 
 /// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Geometric means of the steps
 /// with 1.0, 1.2 and 1.3 (the first with α_start = 0.25, the others with 0.1), N = 1024: 3184, 2654, 2573 at φ = 0.86 (96 seeds);
@@ -143,5 +143,13 @@ impl Model for MorseWitten {
     /// `1.2/ω_max`.
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
         Ok(DT_MAX_TIMES_OMEGA / largest_frequency(packing, &mut self.law, 20)?)
+    }
+
+    fn promise(&self, packing: &Packing, frame: &Frame, threshold: f64) -> f64 {
+        self.promise_of(packing, frame, threshold)
+    }
+
+    fn check(&self, packing: &Packing, frame: &Frame, threshold: f64) -> Check {
+        self.check_frame(packing, frame, threshold)
     }
 }

@@ -254,25 +254,6 @@ impl Geometry {
             .zip(ends)
             .map(|(&q, end)| (q, end >> 1, self.toward(end)))
     }
-
-    /// The gap between the deformed contours of particles `i < j` that are not in contact (length):
-    /// `r_ij − ρ_i(θ_j) − ρ_j(θ_i)`, which is `−Δ_ij` in Saitoh 2.2.4.
-    ///
-    /// `forces` has one entry a contact, `line_tension` is γ.
-    #[cfg(feature = "recording")]
-    pub(crate) fn gap(
-        &self,
-        packing: &Packing,
-        line_tension: f64,
-        forces: &[f64],
-        i: usize,
-        j: usize,
-    ) -> f64 {
-        gap_of(packing, line_tension, [i, j], |p| {
-            self.around(p)
-                .map(|(_, c, toward)| (forces[c as usize], toward))
-        })
-    }
 }
 
 impl Part<'_> {

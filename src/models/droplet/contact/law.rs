@@ -217,6 +217,11 @@ impl ContactLaw {
         self.line_tension
     }
 
+    /// How the contact list follows the positions.
+    pub(crate) fn rule(&self) -> Rule {
+        self.rule
+    }
+
     /// `1/2πγ`.
     pub(super) fn per_radius(&self) -> f64 {
         1.0 / (2.0 * PI * self.line_tension)
@@ -416,8 +421,8 @@ impl ContactLaw {
     /// ```
     /// # use softjam::{protocol::Relaxation, scene::Scene};
     /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.law().tolerance_at(run.packing(), 0.0), 1e-12);
-    /// assert!(run.law().tolerance_at(run.packing(), 1e-3) > 1e-8);
+    /// assert_eq!(run.law().unwrap().tolerance_at(run.packing(), 0.0), 1e-12);
+    /// assert!(run.law().unwrap().tolerance_at(run.packing(), 1e-3) > 1e-8);
     /// ```
     #[must_use]
     pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
