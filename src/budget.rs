@@ -61,30 +61,18 @@ impl Default for Budget {
 
 impl Budget {
     /// A budget of so many bytes.
-    ///
-    /// ```
-    /// assert_eq!(softjam::budget::Budget::of(1 << 30), "1G".parse().unwrap());
-    /// ```
     #[must_use]
     pub fn of(bytes: u64) -> Self {
         Self { bytes }
     }
 
     /// Bytes in all.
-    ///
-    /// ```
-    /// assert_eq!(softjam::budget::Budget::default().bytes(), 4 << 30);
-    /// ```
     #[must_use]
     pub fn bytes(self) -> u64 {
         self.bytes
     }
 
     /// Bytes that a piece of a file may have (a message, a chunk, a start file): an eighth of all.
-    ///
-    /// ```
-    /// assert_eq!(softjam::budget::Budget::default().piece(), 512 << 20);
-    /// ```
     #[must_use]
     pub fn piece(self) -> u64 {
         self.bytes / PIECES
@@ -106,11 +94,6 @@ impl Budget {
     /// # Errors
     ///
     /// [`Exceeded`] names it, the number and the way out.
-    ///
-    /// ```
-    /// let error = softjam::budget::Budget::default().allow_piece("a chunk", 1 << 40).unwrap_err();
-    /// assert_eq!(error.to_string(), "a chunk takes about 1.0 TiB, more than an eighth, 512.0 MiB, of --memory");
-    /// ```
     pub fn allow_piece(self, what: impl fmt::Display, bytes: u64) -> Result<(), Exceeded> {
         within(what, bytes, Share::Eighth, self.piece())
     }

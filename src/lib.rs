@@ -84,9 +84,5 @@ pub mod text;
 /// The revision of the bits: a number that is raised whenever a change of the program alters a bit of any state. A scene gives
 /// the same bits with every version of one revision; of another revision a replay expects the same physics, not the same bits.
 ///
-/// ```
-/// assert_eq!(softjam::BITS, 2);
-/// ```
-///
 /// Revision 2: Newton's method leaves a saddle instead of ending there. Runs by FIRE alone are those of revision 1.
 pub const BITS: u32 = 2;

@@ -13,11 +13,6 @@
 use core::fmt::Display;
 
 /// Characters of a name or a value that are shown at most.
-///
-/// ```
-/// let long = "7".repeat(1_000_000);
-/// assert_eq!(softjam::text::shown(&long).chars().count(), softjam::text::LONGEST);
-/// ```
 pub const LONGEST: usize = 240;
 
 /// Characters of a whole message that are shown at most.

@@ -74,8 +74,6 @@ impl FrameForces {
     }
 
     /// The net force `F_i` on each particle (force).
-    ///
-    /// See the example of [`FrameForces::of`].
     #[must_use]
     pub fn net(&self) -> &[Vec2] {
         &self.net
@@ -88,8 +86,6 @@ impl FrameForces {
     }
 
     /// Balance, energy, stress and coordination.
-    ///
-    /// See the example of [`FrameForces::of`].
     #[must_use]
     pub fn observables(&self) -> &Observables {
         &self.observables

@@ -90,8 +90,6 @@ impl Backbone {
     /// # Panics
     ///
     /// If a contact names a particle that is not there.
-    ///
-    /// See the example of [`Backbone`].
     pub fn count(&mut self, particles: usize, contacts: &Contacts<'_>) -> (usize, usize) {
         let touching = contacts.forces.iter().filter(|f| **f > 0.0).count();
         self.count_touching(particles, contacts, touching)
@@ -131,14 +129,6 @@ impl Backbone {
     /// # Panics
     ///
     /// If a pair names a particle that is not there.
-    ///
-    /// ```
-    /// use softjam::analysis::Backbone;
-    ///
-    /// let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
-    /// let held = Backbone::default().held(5, &pairs, &[1.0; 8]);
-    /// assert_eq!(held, [true, true, true, true, false]);
-    /// ```
     pub fn held(&mut self, particles: usize, pairs: &[[u32; 2]], forces: &[f64]) -> Vec<bool> {
         let touching = forces.iter().filter(|f| **f > 0.0).count();
         self.count_bearing(particles, (pairs, forces), touching);
@@ -246,8 +236,6 @@ impl Backbone {
     }
 
     /// How often it was counted anew so far: a count of work.
-    ///
-    /// See the example of [`Backbone`].
     #[must_use]
     pub fn counts(&self) -> u64 {
         self.counts

@@ -62,8 +62,6 @@ pub const CURVE_COLORS: usize = COLORS.len();
 const GREY: &str = "#3c3c3c";
 
 /// The width of a chart (pixels of the SVG, 96 an inch), where no other is asked for.
-///
-/// See the example of [`chart_in`].
 pub const CHART_WIDTH: f64 = 720.0;
 
 /// Height over width.

@@ -3,6 +3,8 @@
 //! J. Guénolé et al., Comput. Mater. Sci. 175, 109584 (2020), after E. Bitzek et al., Phys. Rev. Lett. 97, 170201
 //! (2006): damped dynamics that turns the velocity towards the force while the power `P = F·v` is positive, and stops
 //! and steps back half a move when it is not. Mass 1; semi-implicit Euler; the mixing comes before the move.
+//!
+//! See the example of [`Fire`].
 
 use crate::domain::{Domain, Vec2};
 use crate::minimize::newton::Turns;
@@ -80,11 +82,6 @@ pub struct FireState {
 
 impl FireState {
     /// The names of the recorded [`values`](Self::values), in their order.
-    ///
-    /// ```
-    /// # use softjam::minimize::fire::FireState;
-    /// assert_eq!(FireState::NAMES[1], "dt_max");
-    /// ```
     pub const NAMES: [&str; 9] = [
         "dt",
         "dt_max",
@@ -98,12 +95,6 @@ impl FireState {
     ];
 
     /// The state at the start of a relaxation with the given bound of the time step.
-    ///
-    /// ```
-    /// # use softjam::minimize::fire::{Fire, FireState};
-    /// let state = FireState::start(&Fire::default(), 0.2);
-    /// assert_eq!((state.dt_max, state.alpha, state.time), (0.2, 0.1, 0.0));
-    /// ```
     #[must_use]
     pub fn start(fire: &Fire, dt_max: f64) -> Self {
         Self {
@@ -126,11 +117,6 @@ impl FireState {
 
     /// The state as it is recorded: `dt`, `dt_max`, `alpha`, `downhill`, `moves`, `time`; and, once Newton's method was
     /// tried, the three numbers of its [`Turns`]: `moves`, `failures`, `wait`.
-    ///
-    /// ```
-    /// # use softjam::minimize::fire::FireState;
-    /// assert_eq!(FireState::default().values(), [0.0; 6]);
-    /// ```
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
         let mut values = vec![
@@ -154,11 +140,6 @@ impl FireState {
 
     /// The state from its recorded values; `None` if there are neither six nor nine, if a count is not a whole
     /// number, or if the last three are all zero.
-    ///
-    /// ```
-    /// # use softjam::minimize::fire::FireState;
-    /// assert_eq!(FireState::from_values(&[0.1, 0.2, 0.25, 1.5, 3.0, 0.7]), None);
-    /// ```
     #[must_use]
     pub fn from_values(values: &[f64]) -> Option<Self> {
         let &[dt, dt_max, alpha, downhill, moves, time, ref rest @ ..] = values else {

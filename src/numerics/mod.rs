@@ -1,4 +1,6 @@
 //! What is not physics: a sparse factorisation with one order of sums, loops for wide vectors, a second thread.
+//!
+//! See the example of [`threads::with`].
 
 pub(crate) mod simplicial;
 pub mod threads;

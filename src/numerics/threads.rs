@@ -6,6 +6,8 @@
 //!
 //! The two halves of a loop write to places of their own, and no sum knows how it was shared out: the bits of a run are the same with
 //! one thread and with two.
+//!
+//! See the example of [`with`].
 
 use core::cell::Cell;
 use core::hint::spin_loop;
@@ -17,10 +19,6 @@ thread_local! {
 }
 
 /// The most threads that a run has a use for.
-///
-/// ```
-/// assert_eq!(softjam::numerics::threads::MOST, 2);
-/// ```
 pub const MOST: usize = 2;
 
 /// Why there are no such threads.

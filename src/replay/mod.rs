@@ -6,6 +6,8 @@
 //! Two questions are put to it. [`determinism`]: is the trajectory what the scene gives, bit for bit? And [`Balance`]: do
 //! its frames fulfil the contact law and, at the end, balance of forces, from positions and radii alone? [`compare`] holds
 //! two recordings against each other.
+//!
+//! See the example of [`Recording`].
 
 mod balance;
 mod bytes;

@@ -113,8 +113,6 @@ impl SceneFields {
     /// # Errors
     ///
     /// [`SceneError::Toml`] for a field that does not exist or a value of the wrong kind.
-    ///
-    /// See the example of [`SceneFields`].
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
         Ok(toml::from_str(text)?)
     }
@@ -170,8 +168,6 @@ impl SceneFields {
     }
 
     /// These fields, each replaced where `flags` has a value. Radii and start are replaced as a whole.
-    ///
-    /// See the example of [`SceneFields`].
     #[must_use]
     pub fn overridden_by(mut self, flags: Self) -> Self {
         if flags.species.is_some() || flags.spread.is_some() {
@@ -238,11 +234,6 @@ impl SceneFields {
     /// # Errors
     ///
     /// [`SceneError`] names the field, its value and what is allowed.
-    ///
-    /// ```
-    /// use softjam::scene::{Scene, SceneFields};
-    /// assert_eq!(SceneFields::default().into_scene().unwrap(), Scene::default());
-    /// ```
     pub fn into_scene(self) -> Result<Scene, SceneError> {
         let start = self.start()?;
         let radii = self.radii()?;

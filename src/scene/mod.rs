@@ -356,13 +356,6 @@ impl Scene {
     /// # Errors
     ///
     /// [`SceneError`] names the first field that is wrong, its value and what is allowed.
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    ///
-    /// assert_eq!(Scene::from_toml("").unwrap(), Scene::default());
-    /// assert!(Scene::from_toml("coverage = 0.9").unwrap_err().to_string().contains("unknown field `coverage`"));
-    /// ```
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
         SceneFields::from_toml(text)?.into_scene()
     }
@@ -372,11 +365,6 @@ impl Scene {
     /// # Errors
     ///
     /// [`SceneError::Read`] if the start file cannot be read.
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    /// assert_eq!(Scene::default().pinned().unwrap(), Scene::default());
-    /// ```
     pub fn pinned(mut self) -> Result<Self, SceneError> {
         if let Start::File {
             path,
@@ -391,12 +379,6 @@ impl Scene {
 
     /// Whether the centres are relaxed as undeformed disks before the run; those of a start file are if it is asked for. A run of
     /// disks is that relaxation.
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    /// assert!(Scene::default().starts_from_disks());
-    /// assert!(!Scene::from_toml("file = \"mine.csv\"").unwrap().starts_from_disks());
-    /// ```
     #[must_use]
     pub fn starts_from_disks(&self) -> bool {
         let prepared = match self.start {
@@ -407,18 +389,12 @@ impl Scene {
     }
 
     /// Whether particles, radii and box come from a file.
-    ///
-    /// ```
-    /// assert!(!softjam::scene::Scene::default().starts_from_file());
-    /// ```
     #[must_use]
     pub fn starts_from_file(&self) -> bool {
         matches!(self.start, Start::File { .. })
     }
 
     /// The model that the scene asks for, with nothing solved yet.
-    ///
-    /// See the example of [`models`](crate::models).
     #[must_use]
     pub fn model(&self) -> AnyModel {
         match self.model {
@@ -441,11 +417,6 @@ impl Scene {
     }
 
     /// BLAKE3 of [`to_toml`](Self::to_toml): the identity of the scene.
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    /// assert_ne!(Scene::default().digest(), Scene { seed: 2, ..Scene::default() }.digest());
-    /// ```
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
         *blake3::hash(self.to_toml().as_bytes()).as_bytes()

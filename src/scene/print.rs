@@ -8,13 +8,6 @@ use core::fmt::Write as _;
 impl Scene {
     /// The scene as TOML, every field written out with its meaning, range and unit; [`from_toml`](Self::from_toml)
     /// gives it back exactly.
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    ///
-    /// let text = Scene { seed: 7, ..Scene::default() }.to_toml();
-    /// assert!(text.lines().any(|line| line == "seed = 7"));
-    /// ```
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut page = Page::default();

@@ -1,4 +1,6 @@
 //! What is recorded, and at which steps.
+//!
+//! See the example of [`Schedule`].
 
 use core::fmt;
 use core::str::FromStr;
@@ -28,10 +30,6 @@ pub enum Schedule {
 
 impl Schedule {
     /// Whether `step` is one of the schedule's.
-    ///
-    /// ```
-    /// assert!(!softjam::scene::Schedule::Off.includes(0));
-    /// ```
     #[must_use]
     pub fn includes(self, step: u64) -> bool {
         match self {
@@ -48,13 +46,6 @@ impl Schedule {
     }
 
     /// The first step of the schedule behind `step`; `None` if there is none.
-    ///
-    /// ```
-    /// use softjam::scene::Schedule;
-    /// assert_eq!(Schedule::Every(10).after(20), Some(30));
-    /// assert_eq!(Schedule::Log(2).after(10), Some(32));
-    /// assert_eq!(Schedule::Off.after(10), None);
-    /// ```
     #[must_use]
     pub fn after(self, step: u64) -> Option<u64> {
         match self {
@@ -73,10 +64,6 @@ impl Schedule {
     }
 
     /// Whether anything is recorded at all.
-    ///
-    /// ```
-    /// assert!(softjam::scene::Schedule::Every(5).is_on());
-    /// ```
     #[must_use]
     pub fn is_on(self) -> bool {
         self != Self::Off
@@ -172,11 +159,6 @@ impl Default for Channels {
 
 impl Channels {
     /// Each channel with its name.
-    ///
-    /// ```
-    /// let names: Vec<_> = softjam::scene::Channels::default().named().iter().map(|c| c.0).collect();
-    /// assert_eq!(names, ["contours", "contacts", "metrics", "state"]);
-    /// ```
     #[must_use]
     pub fn named(&self) -> [(&'static str, Schedule); 4] {
         [
@@ -189,12 +171,6 @@ impl Channels {
 
     /// Which of the channels, in the order of [`named`](Self::named), are recorded at `step`. At an `edge`, the first or
     /// the last frame of a recording, every channel is that is on.
-    ///
-    /// ```
-    /// let channels = softjam::scene::Channels::default();
-    /// assert_eq!(channels.at(7, false), [false, false, true, false]);
-    /// assert_eq!(channels.at(7, true), [true; 4]);
-    /// ```
     #[must_use]
     pub fn at(&self, step: u64, edge: bool) -> [bool; 4] {
         let recorded = |s: Schedule| s.includes(step) || (edge && s.is_on());

@@ -7,6 +7,8 @@
 //! In a random start radii and positions are drawn first, in this order; then the particles are numbered along Morton's
 //! curve (G. M. Morton, IBM Ltd., 1966), so that particles near each other have numbers near each other and stand near
 //! each other in memory. Numbers mean nothing to the physics.
+//!
+//! See the example of [`packing()`].
 
 pub use super::start_file::{Coincidence, StartFile, read_csv};
 

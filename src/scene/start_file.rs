@@ -93,11 +93,6 @@ impl StartFile {
     /// # Errors
     ///
     /// [`SceneError::Read`], or [`SceneError::StartFile`] for what is no text.
-    ///
-    /// ```
-    /// let error = softjam::scene::start::StartFile::read("no/such/file.csv").unwrap_err();
-    /// assert!(error.to_string().starts_with("cannot read no/such/file.csv"));
-    /// ```
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         Self::read_within(path, Budget::of(u64::MAX))
     }
@@ -107,15 +102,6 @@ impl StartFile {
     /// # Errors
     ///
     /// As [`read`](Self::read), and [`SceneError::StartFile`] if the file is longer.
-    ///
-    /// ```
-    /// # use softjam::{budget::Budget, scene::start::StartFile};
-    /// # let path = std::env::temp_dir().join("softjam-start-file-budget-example.csv");
-    /// # std::fs::write(&path, "# box = 6, 6\nx,y,radius\n1,1,0.5\n").unwrap();
-    /// let error = StartFile::read_within(&path, Budget::of(80)).unwrap_err();
-    /// assert!(error.to_string().contains("of --memory"), "{error}");
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
     pub fn read_within(path: impl AsRef<Path>, budget: Budget) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let mut file = Self {
@@ -156,14 +142,6 @@ impl StartFile {
     }
 
     /// BLAKE3 of the file in hexadecimal.
-    ///
-    /// ```
-    /// # let path = std::env::temp_dir().join("softjam-start-file-hash-example.csv");
-    /// std::fs::write(&path, "").unwrap();
-    /// let hash = softjam::scene::start::StartFile::read(&path).unwrap().blake3();
-    /// assert!(hash.starts_with("af1349b9"), "that of nothing");
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
     #[must_use]
     pub fn blake3(&self) -> String {
         blake3::hash(&self.bytes).to_hex().to_string()
@@ -174,16 +152,6 @@ impl StartFile {
     /// # Errors
     ///
     /// [`SceneError::StartFile`] if it should have another `blake3`.
-    ///
-    /// ```
-    /// # use softjam::scene::{Preparation, start::StartFile};
-    /// # let path = std::env::temp_dir().join("softjam-start-file-start-example.csv");
-    /// # std::fs::write(&path, "").unwrap();
-    /// let file = StartFile::read(&path).unwrap();
-    /// assert!(file.start(None, Preparation::AsItStands).is_ok());
-    /// assert!(file.start(Some("00ff"), Preparation::AsItStands).is_err());
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
     pub fn start(
         &self,
         blake3: Option<&str>,
@@ -211,8 +179,6 @@ impl StartFile {
     /// # Errors
     ///
     /// [`SceneError::StartFile`] names the line that is wrong and what stands there.
-    ///
-    /// See the example of [`read_csv`].
     pub fn packing(&self) -> Result<Packing, SceneError> {
         let (packing, _) = self.table().map_err(|complaint| self.wrong(complaint))?;
         Ok(packing)

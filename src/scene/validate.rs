@@ -17,13 +17,6 @@ impl Scene {
     ///
     /// [`SceneError::Range`] for the first field that is wrong. Whether the box is large enough shows when the radii
     /// are there, in [`start::packing`](super::start::packing).
-    ///
-    /// ```
-    /// use softjam::scene::Scene;
-    ///
-    /// let error = Scene { aspect: f64::NAN, ..Scene::default() }.validate().unwrap_err();
-    /// assert_eq!(error.to_string(), "aspect = NaN is outside 0.1 ≤ aspect ≤ 10 (L_x / L_y)");
-    /// ```
     pub fn validate(&self) -> Result<(), SceneError> {
         within(
             "line_tension",
@@ -207,11 +200,6 @@ impl Scene {
     }
 
     /// About how many bytes a run of `particles` particles needs at its peak, queue of the recorder included.
-    ///
-    /// ```
-    /// let scene = softjam::scene::Scene::default();
-    /// assert!(scene.memory_estimate(1000) > 1_000_000);
-    /// ```
     #[must_use]
     pub fn memory_estimate(&self, particles: usize) -> u64 {
         // Measured (growth of the peak resident size from N = 20 000 to 40 000, every step recorded with 32 vertices, at

@@ -108,13 +108,6 @@ impl Frame {
     /// Hashed, in little-endian bytes: `step` u64, `N` u64, the positions and then the velocities (x, y as f64 each),
     /// `N_c` u64, the contacts (i, j as u32 each), the forces (f64 each), the length of the minimiser's list u64 and its
     /// values (f64 each, in the order of [`FireState::values`]).
-    ///
-    /// ```
-    /// use softjam::state::Frame;
-    ///
-    /// let (a, b) = (Frame::default(), Frame { step: 1, ..Frame::default() });
-    /// assert_ne!(a.digest(), b.digest());
-    /// ```
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
         let minimizer = self.minimizer.values();
@@ -148,14 +141,6 @@ impl Frame {
     /// # Errors
     ///
     /// [`FrameError`] names the first entry that is wrong.
-    ///
-    /// ```
-    /// use softjam::{domain::Domain, state::Frame};
-    ///
-    /// let frame = Frame { contacts: vec![[1, 0]], forces: vec![1.0], ..Frame::default() };
-    /// let error = frame.validate(0, Domain::new(1.0, 1.0).unwrap()).unwrap_err();
-    /// assert_eq!(error.to_string(), "contact 0 is [1, 0]: pairs must ascend with i < j < 0");
-    /// ```
     pub fn validate(&self, particles: usize, domain: Domain) -> Result<(), FrameError> {
         for (what, found) in [
             ("position", self.positions.len()),

@@ -84,17 +84,6 @@ impl Packing {
     ///
     /// [`PackingError`] when a radius is not positive and finite, a position is not finite, the two lists differ in
     /// length or there is no particle.
-    ///
-    /// # Example
-    ///
-    /// ```
-    /// use softjam::domain::{Domain, Vec2};
-    /// use softjam::state::Packing;
-    ///
-    /// let domain = Domain::new(4.0, 4.0).unwrap();
-    /// let error = Packing::new(domain, vec![-0.5], vec![Vec2::zeros()]).unwrap_err();
-    /// assert_eq!(error.to_string(), "radius -0.5 of particle 0 is not a positive, finite length");
-    /// ```
     pub fn new(
         domain: Domain,
         radii: Vec<f64>,
@@ -136,12 +125,6 @@ impl Packing {
     }
 
     /// Number of particles `N`.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert_eq!(packing.len(), 1);
-    /// ```
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a packing is never empty")]
     pub fn len(&self) -> usize {
@@ -149,36 +132,18 @@ impl Packing {
     }
 
     /// The periodic box.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert_eq!(packing.domain().area(), 16.0);
-    /// ```
     #[must_use]
     pub fn domain(&self) -> Domain {
         self.domain
     }
 
     /// The undeformed radii `R_i`.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert_eq!(packing.radii(), [0.5]);
-    /// ```
     #[must_use]
     pub fn radii(&self) -> &[f64] {
         &self.radii
     }
 
     /// The largest undeformed radius.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert_eq!(packing.largest_radius(), 0.5);
-    /// ```
     #[must_use]
     pub fn largest_radius(&self) -> f64 {
         self.sizes[1]
@@ -197,12 +162,6 @@ impl Packing {
     }
 
     /// The centres `r_i`, wrapped into the box.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5], vec![Vec2::new(-1.0, 5.0)]).unwrap();
-    /// assert_eq!(packing.positions(), [Vec2::new(3.0, 1.0)]);
-    /// ```
     #[must_use]
     pub fn positions(&self) -> &[Vec2] {
         &self.positions
@@ -224,13 +183,6 @@ impl Packing {
     /// # Panics
     ///
     /// If `i` or `j` is not below [`len`](Self::len).
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let at = |x| Vec2::new(x, 0.0);
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![0.5; 2], vec![at(0.5), at(3.5)]).unwrap();
-    /// assert_eq!(packing.separation(0, 1), Vec2::new(1.0, 0.0));
-    /// ```
     #[must_use]
     #[inline]
     pub fn separation(&self, i: usize, j: usize) -> Vec2 {
@@ -239,12 +191,6 @@ impl Packing {
     }
 
     /// The coverage of the undeformed disks, `φ = Σ π R_i² / (L_x L_y)`.
-    ///
-    /// ```
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(4.0, 4.0).unwrap(), vec![2.0], vec![Vec2::zeros()]).unwrap();
-    /// assert!((packing.coverage() - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
-    /// ```
     #[must_use]
     pub fn coverage(&self) -> f64 {
         coverage(&self.radii, self.domain)

@@ -6,6 +6,8 @@
 //! several times the steps. Prestress, turning contacts and the torques of the gradient form are left out: at φ = 0.86, 0.95
 //! and 1.1 the whole linear problem has 1.004, 0.99 and 0.97 times this `ω_max` with central and 1.003, 0.98 and 0.94 times
 //! with gradient forces (N = 48, twenty iterations; a test of `newton/linear.rs`).
+//!
+//! See the example of [`largest_frequency`].
 
 use crate::contacts::net_forces;
 use crate::domain::Vec2;

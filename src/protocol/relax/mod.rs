@@ -58,13 +58,6 @@ impl Relaxation {
     /// # Errors
     ///
     /// [`RelaxError::Scene`] for an invalid scene, [`RelaxError::Contact`] if the contact problem cannot be solved.
-    ///
-    /// ```
-    /// use softjam::{protocol::Relaxation, scene::Scene};
-    ///
-    /// let error = Relaxation::new(&Scene { phi: -0.1, ..Scene::default() }).unwrap_err();
-    /// assert!(error.to_string().starts_with("phi = -0.1"));
-    /// ```
     pub fn new(scene: &Scene) -> Result<Self, RelaxError> {
         scene.validate()?;
         Self::of_start(scene, start::packing(scene)?)
@@ -75,14 +68,6 @@ impl Relaxation {
     /// # Errors
     ///
     /// As [`new`](Self::new).
-    ///
-    /// ```
-    /// use softjam::{protocol::Relaxation, scene::{Scene, start}};
-    ///
-    /// let scene = Scene { particles: 32, ..Scene::default() };
-    /// let run = Relaxation::of_start(&scene, start::packing(&scene).unwrap()).unwrap();
-    /// assert_eq!(run.frame().digest(), Relaxation::new(&scene).unwrap().frame().digest());
-    /// ```
     pub fn of_start(scene: &Scene, mut packing: Packing) -> Result<Self, RelaxError> {
         scene.validate()?;
         let disks = scene
@@ -152,14 +137,6 @@ impl Relaxation {
     /// # Errors
     ///
     /// [`RelaxError::Frame`] if the frame does not fit the packing, otherwise as [`new`](Self::new).
-    ///
-    /// ```
-    /// use softjam::{state::Frame, protocol::Relaxation, scene::Scene};
-    ///
-    /// let scene = Scene { particles: 32, ..Scene::default() };
-    /// let run = Relaxation::new(&scene).unwrap();
-    /// assert!(Relaxation::resume(&scene, run.packing().clone(), Frame::default()).is_err());
-    /// ```
     pub fn resume(scene: &Scene, mut packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
@@ -176,13 +153,6 @@ impl Relaxation {
     ///
     /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::TooFar`] if the run blew up. The
     /// run has then [failed](Status::Failed) and is of no further use.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// let mut run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// run.advance().unwrap();
-    /// assert_eq!(run.step(), 1);
-    /// ```
     pub fn advance(&mut self) -> Result<(), RelaxError> {
         if self.is_on_saddle() {
             return self.leave_saddle();
@@ -313,8 +283,6 @@ impl Relaxation {
     /// Whether a frame in balance is a minimum or a saddle; `None` while it is not in balance.
     ///
     /// It is a function of positions, contacts and forces alone, found when it is asked for the first time.
-    ///
-    /// See the example of [`Stability`].
     #[must_use]
     pub fn stability(&self) -> Option<Stability> {
         let judge = || judge(&self.packing, &self.model);
@@ -323,12 +291,6 @@ impl Relaxation {
     }
 
     /// How the run stands at this frame.
-    ///
-    /// ```
-    /// # use softjam::{protocol::{Relaxation, Status}, scene::Scene};
-    /// let run = Relaxation::new(&Scene { particles: 32, steps: 0, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.status(), Status::StepLimit);
-    /// ```
     #[must_use]
     pub fn status(&self) -> Status {
         if self.failed {

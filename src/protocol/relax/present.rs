@@ -12,12 +12,6 @@ use crate::state::Packing;
 
 impl Relaxation {
     /// This frame, as a value of its own.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.frame().positions, run.packing().positions());
-    /// ```
     #[must_use]
     pub fn frame(&self) -> Frame {
         let mut frame = Frame::default();
@@ -26,14 +20,6 @@ impl Relaxation {
     }
 
     /// [`frame`](Self::frame) in the place of another, whose memory it takes.
-    ///
-    /// ```
-    /// # use softjam::{state::Frame, protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// let mut frame = Frame::default();
-    /// run.copy_frame(&mut frame);
-    /// assert_eq!(frame, run.frame());
-    /// ```
     pub fn copy_frame(&self, frame: &mut Frame) {
         frame.step = self.step;
         self.packing.positions().clone_into(&mut frame.positions);
@@ -44,93 +30,48 @@ impl Relaxation {
     }
 
     /// The packing as it stands.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.packing().len(), 32);
-    /// ```
     #[must_use]
     pub fn packing(&self) -> &Packing {
         &self.packing
     }
 
     /// The contacts and forces at this frame.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.contacts().forces.iter().all(|f| *f > 0.0));
-    /// ```
     #[must_use]
     pub fn contacts(&self) -> Contacts<'_> {
         self.model.contacts(&self.packing)
     }
 
     /// The net forces `F_i`, one a particle (force; `line_tension` is in the same unit).
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// let total: softjam::domain::Vec2 = run.net_forces().iter().sum();
-    /// assert!(total.norm() < 1e-14);
-    /// ```
     #[must_use]
     pub fn net_forces(&self) -> &[Vec2] {
         self.model.net_forces()
     }
 
     /// Number of moves made.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.step(), 0);
-    /// ```
     #[must_use]
     pub fn step(&self) -> u64 {
         self.step
     }
 
     /// Simulated time, the sum of the time steps.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.time(), 0.0);
-    /// ```
     #[must_use]
     pub fn time(&self) -> f64 {
         self.state.time
     }
 
     /// The largest net force `f_max` (units of γ).
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(run.f_max(), run.observables().f_max);
-    /// ```
     #[must_use]
     pub fn f_max(&self) -> f64 {
         self.model.f_max()
     }
 
     /// Balance, energy, stress and coordination at this frame.
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.observables().energy > 0.0);
-    /// ```
     #[must_use]
     pub fn observables(&self) -> Observables {
         self.observables_counted(&mut Backbone::default())
     }
 
     /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
-    ///
-    /// See the example of [`Backbone`].
     pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
         Observables::of_model(&self.model, &self.packing, self.state.dt, backbone)
     }
@@ -151,12 +92,6 @@ impl Relaxation {
     }
 
     /// How the undeformed disks relaxed; `None` where there was no such stage (a start from a file, a resumed run).
-    ///
-    /// ```
-    /// # use softjam::{protocol::Relaxation, scene::Scene};
-    /// # let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert!(run.disks().unwrap().converged);
-    /// ```
     #[must_use]
     pub fn disks(&self) -> Option<DiskReport> {
         self.disks

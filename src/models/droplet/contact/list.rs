@@ -1,4 +1,6 @@
 //! The contact list and the duplicate contact list of Saitoh 2.2.2.
+//!
+//! See the example of [`ContactList`].
 
 use core::ops::Range;
 

@@ -1,4 +1,6 @@
 //! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
+//!
+//! See the example of [`ContactMatrix`].
 
 pub use super::geometry::Geometry;
 

@@ -3,6 +3,8 @@
 //! Conjugate gradients is the way of the relaxation: `A` is well conditioned (about 6, whatever the number of
 //! particles) and the forces of the last step are a good guess. The other two cross-check it and are its yardsticks in
 //! the benchmarks: faer's sparse Cholesky, and the dense Gauss–Jordan elimination of Saitoh 2.2.3.
+//!
+//! See the example of [`LinearSolver`].
 
 mod cholesky;
 mod conjugate_gradient;
