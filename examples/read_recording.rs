@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for k in frame.contacts.iter().flatten() {
                 bits.write_all(&k.to_le_bytes())?;
             }
-            for x in frame.forces.iter().chain(&frame.minimizer.values()) {
+            for x in frame.forces.iter().chain(frame.minimizer.values()) {
                 bits.write_all(&x.to_le_bytes())?;
             }
         }

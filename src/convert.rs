@@ -25,6 +25,7 @@
 //! ```
 
 use crate::analysis::{METRICS, Metrics};
+use crate::minimize::dt_and_time;
 use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{
     Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
@@ -345,7 +346,7 @@ impl Conversion {
         if pictured || metrics.is_some() {
             self.writer.send(Snapshot {
                 step,
-                nanoseconds: nanoseconds(frame.minimizer.time),
+                nanoseconds: nanoseconds(dt_and_time(&frame.minimizer).1),
                 metrics,
                 frame: pictured.then(|| frame.clone()),
                 contours,

@@ -2,6 +2,7 @@
 
 use super::{Backbone, Observables};
 use crate::domain::Vec2;
+use crate::minimize::dt_and_time;
 use crate::models::{AnyModel, Model};
 use crate::state::Frame;
 use crate::state::Packing;
@@ -65,7 +66,7 @@ impl FrameForces {
         let mut packing = packing.clone();
         frame.positions.clone_into(packing.positions_mut());
         model.restore(&packing, &frame.contacts, &frame.forces);
-        let dt = frame.minimizer.dt;
+        let (dt, _) = dt_and_time(&frame.minimizer);
         Self {
             net: model.net_forces().to_vec(),
             torques: model.torques().to_vec(),

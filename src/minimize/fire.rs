@@ -9,6 +9,7 @@
 use crate::domain::{Domain, Vec2};
 use crate::minimize::newton::Turns;
 use crate::numerics::wide::wide;
+use crate::state::Numbers;
 
 /// FIRE's parameters; the defaults are those of the paper.
 ///
@@ -136,6 +137,25 @@ impl FireState {
             values.extend([moves, failures, wait].map(f64::from));
         }
         values
+    }
+
+    /// [`values`](Self::values) under the name of the minimiser.
+    #[must_use]
+    pub fn numbers(&self) -> Numbers {
+        let values = self.values();
+        let name = if values.len() == 6 {
+            "fire"
+        } else {
+            "fire+newton"
+        };
+        Numbers::new(name, values)
+    }
+
+    /// The state in the numbers of a frame; `None` if they are another minimiser's.
+    #[must_use]
+    pub fn of(numbers: &Numbers) -> Option<Self> {
+        let state = Self::from_values(numbers.values())?;
+        (state.numbers().name() == numbers.name()).then_some(state)
     }
 
     /// The state from its recorded values; `None` if there are neither six nor nine, if a count is not a whole

@@ -3,4 +3,25 @@
 //! See the example of [`fire::Fire`].
 
 pub mod fire;
+mod mover;
 pub mod newton;
+
+pub(crate) use mover::{Motion, Mover};
+
+use crate::state::Numbers;
+use fire::FireState;
+
+/// The numbers of a minimiser as they were recorded; `None` if they are those of none.
+pub(crate) fn recorded(values: &[f64]) -> Option<Numbers> {
+    FireState::from_values(values).map(|state| state.numbers())
+}
+
+/// Time step and simulated time (time) in the numbers of a minimiser.
+pub(crate) fn dt_and_time(numbers: &Numbers) -> (f64, f64) {
+    FireState::of(numbers).map_or((0.0, 0.0), |state| (state.dt, state.time))
+}
+
+/// What number `k` of a minimiser is.
+pub(crate) fn name_of(k: usize) -> &'static str {
+    FireState::NAMES.get(k).unwrap_or(&"value")
+}

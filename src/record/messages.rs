@@ -126,7 +126,7 @@ impl StateMessage {
             velocity: flat(&frame.velocities),
             contact: frame.contacts.iter().flatten().copied().collect(),
             force: frame.forces.clone(),
-            minimizer: frame.minimizer.values(),
+            minimizer: frame.minimizer.values().to_vec(),
             digest: digest.to_vec(),
         }
     }

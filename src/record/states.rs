@@ -44,7 +44,7 @@ impl StateRows {
         self.contacts.extend(frame.contacts.iter().copied());
         self.forces.extend(frame.forces.iter().map(|f| [*f]));
         self.minimizers
-            .extend(frame.minimizer.values().into_iter().map(|x| [x]));
+            .extend(frame.minimizer.values().iter().map(|x| [*x]));
         self.digests.extend(digest.map(|byte| [byte]));
         self.positions.end_row();
         self.velocities.end_row();

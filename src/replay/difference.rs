@@ -2,7 +2,7 @@
 
 use crate::analysis::Stability;
 use crate::domain::Vec2;
-use crate::minimize::fire::FireState;
+use crate::minimize::name_of;
 use crate::state::Frame;
 use crate::text::counted;
 use core::fmt;
@@ -163,9 +163,8 @@ fn what(a: &Frame, b: &Frame) -> Option<What> {
         .or_else(|| count("forces", a.forces.len(), b.forces.len()))
         .or_else(|| numbers(&a.forces, &b.forces, |c| format!("force of contact {c}")))
         .or_else(|| {
-            numbers(&a.minimizer.values(), &b.minimizer.values(), |k| {
-                let name = FireState::NAMES.get(k).unwrap_or(&"value");
-                format!("{name} of the minimiser")
+            numbers(a.minimizer.values(), b.minimizer.values(), |k| {
+                format!("{} of the minimiser", name_of(k))
             })
         })
         .or_else(|| {

@@ -1,7 +1,6 @@
 //! A frame: everything that the next frame follows from.
 
 use crate::domain::{Domain, Vec2};
-use crate::minimize::fire::FireState;
 use crate::text::counted;
 
 /// The state *before* move `step`: positions and velocities, the contact forces solved at these positions, and the
@@ -35,8 +34,41 @@ pub struct Frame {
     pub contacts: Vec<[u32; 2]>,
     /// Contact forces `f_ij` in the order of `contacts` (force).
     pub forces: Vec<f64>,
-    /// The minimiser's state.
-    pub minimizer: FireState,
+    /// What the minimiser carries from one move to the next.
+    pub minimizer: Numbers,
+}
+
+/// The numbers of a minimiser, under its name.
+///
+/// ```
+/// use softjam::state::Numbers;
+/// let numbers = Numbers::new("fire", vec![0.1, 0.2]);
+/// assert_eq!((numbers.name(), numbers.values()), ("fire", &[0.1, 0.2][..]));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Numbers {
+    name: &'static str,
+    values: Vec<f64>,
+}
+
+impl Numbers {
+    /// The numbers of the minimiser called `name`.
+    #[must_use]
+    pub fn new(name: &'static str, values: Vec<f64>) -> Self {
+        Self { name, values }
+    }
+
+    /// The minimiser's name.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Its numbers, in an order of its own.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
 }
 
 /// Why a frame cannot belong to a packing of the given size and box.
@@ -89,6 +121,14 @@ pub enum FrameError {
         /// Number of its contacts.
         contacts: usize,
     },
+    /// The minimiser's numbers are not those of the scene's minimiser.
+    #[error("{} of the minimiser {minimizer:?}, which the scene's has no use for", counted(.count, "number"))]
+    Minimizer {
+        /// Its name.
+        minimizer: &'static str,
+        /// How many numbers there are.
+        count: usize,
+    },
     /// A position lies outside the box, or a number is not finite.
     #[error("{what} {index} is {value}, which no run can give")]
     Value {
@@ -107,7 +147,7 @@ impl Frame {
     ///
     /// Hashed, in little-endian bytes: `step` u64, `N` u64, the positions and then the velocities (x, y as f64 each),
     /// `N_c` u64, the contacts (i, j as u32 each), the forces (f64 each), the length of the minimiser's list u64 and its
-    /// values (f64 each, in the order of [`FireState::values`]).
+    /// values (f64 each).
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
         let minimizer = self.minimizer.values();
@@ -185,7 +225,10 @@ impl Frame {
             &mut self.velocities.iter().flat_map(|v| [v.x, v.y]),
         )?;
         finite("force", &mut self.forces.iter().copied())?;
-        finite("minimiser value", &mut self.minimizer.values().into_iter())?;
+        finite(
+            "minimiser value",
+            &mut self.minimizer.values().iter().copied(),
+        )?;
         let l = domain.lengths();
         for (index, p) in self.positions.iter().enumerate() {
             for (value, length) in [(p.x, l.x), (p.y, l.y)] {
@@ -227,7 +270,7 @@ mod tests {
             velocities: vec![Vec2::new(0.5, -0.5), Vec2::new(-0.0, 0.0)],
             contacts: vec![[0, 1]],
             forces: vec![0.25],
-            minimizer: FireState::default(),
+            minimizer: Numbers::new("fire", vec![0.0; 6]),
         };
         // b3sum of the bytes written down by hand from the documentation of `digest`.
         let mut bytes = vec![3, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0];

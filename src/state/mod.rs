@@ -5,5 +5,5 @@
 mod frame;
 mod packing;
 
-pub use frame::{Frame, FrameError};
+pub use frame::{Frame, FrameError, Numbers};
 pub use packing::*;

@@ -1,13 +1,14 @@
 //! What several themes need: random numbers of the tests' own, packings to work on, and bounds that show their value.
 
 use softjam::domain::{Domain, Vec2};
+use softjam::minimize::fire::FireState;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
 use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Radii, Scene, Species};
-use softjam::state::Packing;
+use softjam::state::{Frame, Packing};
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -181,4 +182,9 @@ impl Drop for Folder {
         // What cannot be removed is left to the system's own cleaning.
         drop(std::fs::remove_dir_all(&self.0));
     }
+}
+
+/// The state of FIRE in a frame.
+pub fn fire(frame: &Frame) -> FireState {
+    FireState::of(&frame.minimizer).expect("numbers of FIRE")
 }

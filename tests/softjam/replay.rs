@@ -1,7 +1,9 @@
 //! Replay: a recording proves itself, and nothing that is done to it passes in silence.
 
+use crate::common::fire;
 use crate::files::{open, record_as, states};
 use softjam::analysis::METRICS;
+use softjam::minimize::fire::FireState;
 use softjam::minimize::newton::Turns;
 use softjam::models::droplet::Form;
 use softjam::protocol::Relaxation;
@@ -72,7 +74,7 @@ fn a_run_finished_by_newton_with_either_form_of_forces_is_verified() {
         let bytes = record(&scene, |_| {});
         let frames = states(&bytes);
         let last = frames.last().expect("a state");
-        assert!(last.minimizer.turns.moves > 0, "{forces:?}");
+        assert!(fire(&last).turns.moves > 0, "{forces:?}");
         for way in WAYS {
             let verdict = replay(&bytes, way).expect("a verdict");
             assert_eq!(verdict.difference, None, "{forces:?}, {way:?}");
@@ -98,13 +100,13 @@ fn a_run_finished_by_newton_with_either_form_of_forces_is_verified() {
 fn forged_turns_of_the_minimiser_are_found() {
     let scene = finished(Form::Central);
     let whole = record(&scene, |_| {});
-    let first = states(&whole)
-        .into_iter()
-        .find(|f| f.minimizer.turns.moves > 0);
+    let first = states(&whole).into_iter().find(|f| fire(f).turns.moves > 0);
     let step = first.expect("Newton's method at work").step;
     let forged = record(&scene, |snapshot| {
         if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.step == step) {
-            frame.minimizer.turns.moves += 1;
+            let mut state = fire(frame);
+            state.turns.moves += 1;
+            frame.minimizer = state.numbers();
         }
     });
     for way in WAYS {
@@ -117,7 +119,11 @@ fn forged_turns_of_the_minimiser_are_found() {
     }
     let forged = record(&scene, |snapshot| {
         if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.step == step) {
-            frame.minimizer.turns = Turns::default();
+            let state = FireState {
+                turns: Turns::default(),
+                ..fire(frame)
+            };
+            frame.minimizer = state.numbers();
         }
     });
     let found = replay(&forged, Way::Whole).expect("a verdict").difference;
@@ -164,7 +170,9 @@ fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
         }),
         ("alpha of the minimiser", |s| {
             if let Some(frame) = s.frame.as_mut().filter(|f| f.step == 40) {
-                frame.minimizer.alpha *= 0.99;
+                let mut state = fire(frame);
+                state.alpha *= 0.99;
+                frame.minimizer = state.numbers();
             }
         }),
         ("contacts: ", |s| {

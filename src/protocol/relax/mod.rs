@@ -10,12 +10,10 @@ pub use status::{RelaxError, Status};
 
 use crate::analysis::{Judgement, Stability, judge};
 use crate::domain::Vec2;
-use crate::minimize::fire::{Fire, FireState};
-use crate::minimize::newton::{Attempt, Newton};
+use crate::minimize::{Motion, Mover};
 use crate::models::{AnyModel, Goal, Model};
 use crate::scene::{Minimizer, Scene, start};
-use crate::state::Frame;
-use crate::state::Packing;
+use crate::state::{Frame, FrameError, Packing};
 use std::sync::OnceLock;
 
 /// A packing on its way to mechanical equilibrium.
@@ -38,13 +36,10 @@ pub struct Relaxation {
     packing: Packing,
     velocities: Vec<Vec2>,
     model: AnyModel,
-    fire: Fire,
-    state: FireState,
+    mover: Mover,
     step: u64,
     threshold: f64,
     step_limit: u64,
-    /// What finishes; `None` where FIRE goes all the way.
-    newton: Option<Newton>,
     disks: Option<DiskReport>,
     /// What this frame is, if it is in balance and somebody asked.
     judgement: OnceLock<Judgement>,
@@ -101,9 +96,9 @@ impl Relaxation {
             Some(dt_max) => dt_max,
             None => model.longest_time_step(&packing).map_err(at_start)?,
         };
-        let state = FireState::start(&scene.fire, dt_max);
+        let mover = Mover::start(scene.fire, finishes(scene), dt_max);
         let velocities = vec![Vec2::zeros(); packing.len()];
-        Ok(Self::at(scene, packing, model, (0, velocities, state)))
+        Ok(Self::at(scene, packing, model, (0, velocities, mover)))
     }
 
     /// A run of `scene` at a step with its velocities and minimiser; `model` has its contacts and forces.
@@ -111,15 +106,13 @@ impl Relaxation {
         scene: &Scene,
         packing: Packing,
         model: AnyModel,
-        (step, velocities, state): (u64, Vec<Vec2>, FireState),
+        (step, velocities, mover): (u64, Vec<Vec2>, Mover),
     ) -> Self {
         Self {
-            newton: (scene.minimizer == Minimizer::FireNewton).then(Newton::default),
             packing,
             velocities,
             model,
-            fire: scene.fire,
-            state,
+            mover,
             step,
             threshold: scene.threshold,
             step_limit: scene.steps,
@@ -143,7 +136,13 @@ impl Relaxation {
         *packing.positions_mut() = frame.positions;
         let mut model = scene.model();
         model.restore(&packing, &frame.contacts, &frame.forces);
-        let moving = (frame.step, frame.velocities, frame.minimizer);
+        let mover = Mover::resume(scene.fire, finishes(scene), &frame.minimizer).ok_or(
+            FrameError::Minimizer {
+                minimizer: frame.minimizer.name(),
+                count: frame.minimizer.values().len(),
+            },
+        )?;
+        let moving = (frame.step, frame.velocities, mover);
         Ok(Self::at(scene, packing, model, moving))
     }
 
@@ -154,118 +153,65 @@ impl Relaxation {
     /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::TooFar`] if the run blew up. The
     /// run has then [failed](Status::Failed) and is of no further use.
     pub fn advance(&mut self) -> Result<(), RelaxError> {
-        if self.is_on_saddle() {
-            return self.leave_saddle();
+        self.step += 1;
+        let is_on_saddle = self.is_on_saddle();
+        let (packing, velocities) = (&mut self.packing, &mut self.velocities);
+        if is_on_saddle {
+            let way_down = self.judgement.take().map_or_else(Vec::new, |j| j.way_down);
+            let motion = (self.mover).leave_saddle(packing, velocities, &way_down);
+            return self.solve_or_fail(motion);
         }
-        if self.finish() {
-            self.step += 1;
-            self.judgement.take();
+        let motion = (self.mover).advance(packing, velocities, &mut self.model, self.threshold);
+        if let Motion::Moved(moved) = motion {
+            self.check_distance(moved)?;
+        }
+        self.solve_or_fail(motion)
+    }
+
+    /// Whether a run that goes on from saddles has come to one.
+    fn is_on_saddle(&self) -> bool {
+        self.mover.leaves_saddles() && self.stability() == Some(Stability::Saddle)
+    }
+
+    /// Fails if a particle was thrown through the box, where none has moved by more than `moved` (length; infinite where that is not
+    /// known).
+    fn check_distance(&mut self, moved: f64) -> Result<(), RelaxError> {
+        let (dt, far) = (self.mover.dt(), 0.25 * self.packing.domain().shortest());
+        // Disks push each other by finite forces, however far they overlap.
+        if moved <= 0.99 * far || matches!(self.model, AnyModel::Disks(_)) {
             return Ok(());
         }
-        let domain = self.packing.domain();
-        // Infinite after a step back: then each velocity is looked at.
-        let moved = self.fire.advance(
-            &mut self.state,
-            self.model.net_forces(),
-            &mut self.velocities,
-            self.packing.positions_mut(),
-            domain,
-        );
-        self.step += 1;
-        let dt = self.state.dt;
-        let far = 0.25 * domain.shortest();
         // A NaN is thrown too.
         let within = |v: &Vec2| (v * dt).norm_squared() <= far * far;
-        let thrown = |v: &Vec2| !within(v);
-        let near = moved <= 0.99 * far;
-        // Disks push each other by finite forces, however far they overlap.
-        let near = near || matches!(self.model, AnyModel::Disks(_));
-        if !near && let Some(particle) = self.velocities.iter().position(thrown) {
-            self.failed = true;
-            return Err(RelaxError::TooFar {
-                step: self.step,
-                particle,
-                distance: (self.velocities[particle] * dt).norm(),
-                dt,
-                dt_max: self.state.dt_max,
-            });
-        }
-        self.solve_or_fail(moved)
+        let Some(particle) = self.velocities.iter().position(|v| !within(v)) else {
+            return Ok(());
+        };
+        self.failed = true;
+        Err(RelaxError::TooFar {
+            step: self.step,
+            particle,
+            distance: (self.velocities[particle] * dt).norm(),
+            dt,
+            dt_max: self.mover.dt_max(),
+        })
     }
 
-    /// Whether Newton's method has come to a saddle, and the run goes on for that.
-    fn is_on_saddle(&self) -> bool {
-        self.newton.is_some() && self.stability() == Some(Stability::Saddle)
-    }
-
-    /// A step down from a saddle: the particles are displaced along the direction that grows, the farthest by
-    /// [`LEAVE`] of the smallest radius, and FIRE goes on from there, at rest, for as long as after a step of Newton's method
-    /// that was given up.
-    fn leave_saddle(&mut self) -> Result<(), RelaxError> {
-        let way_down = self.judgement.take().map_or_else(Vec::new, |j| j.way_down);
-        let longest = way_down.iter().fold(0.0, |m: f64, u| m.max(u.norm()));
-        let moved = LEAVE * self.packing.smallest_radius();
-        let domain = self.packing.domain();
-        for (x, u) in self.packing.positions_mut().iter_mut().zip(&way_down) {
-            *x = domain.wrap(*x + u * (moved / longest));
-        }
-        self.state.turns.fail();
-        self.state.restart(&self.fire);
-        self.velocities.fill(Vec2::zeros());
-        self.step += 1;
-        // Rounding may take the farthest a little farther.
-        self.solve_or_fail(1.01 * moved)
-    }
-
-    /// The model at the new positions; no particle has moved by more than `moved` (length).
-    fn solve_or_fail(&mut self, moved: f64) -> Result<(), RelaxError> {
+    /// The model at the end of a move.
+    fn solve_or_fail(&mut self, motion: Motion) -> Result<(), RelaxError> {
+        self.judgement.take();
+        let Motion::Moved(moved) = motion else {
+            return Ok(());
+        };
         let step = self.step;
         let goal = Goal {
             f_max: self.model.f_max(),
             threshold: self.threshold,
             moved,
         };
-        self.judgement.take();
         self.model.solve(&self.packing, goal).map_err(|source| {
             self.failed = true;
             RelaxError::Contact { step, source }
         })
-    }
-
-    /// One step of Newton's method, where it is its turn; `false` if the move is left to FIRE.
-    ///
-    /// After a step that is kept the particles are at rest, and FIRE would start anew.
-    fn finish(&mut self) -> bool {
-        let (Some(newton), AnyModel::MorseWitten(droplets)) = (&mut self.newton, &mut self.model)
-        else {
-            return false;
-        };
-        // Only Newton's method leaves the particles at rest.
-        let goes_on =
-            self.state.turns.moves > 0 && self.velocities.iter().all(|v| *v == Vec2::zeros());
-        if !Newton::is_due(droplets, goes_on) {
-            return false;
-        }
-        let turns = &mut self.state.turns;
-        if turns.wait > 0 {
-            turns.wait -= 1;
-            return false;
-        }
-        let attempt = newton.advance(
-            &mut self.packing,
-            droplets,
-            self.threshold,
-            turns.is_patient(),
-        );
-        let kept = attempt != Attempt::GivenUp;
-        if kept {
-            turns.succeed(attempt == Attempt::Halved);
-            self.state.restart(&self.fire);
-            self.velocities.fill(Vec2::zeros());
-        } else {
-            turns.fail();
-        }
-        kept
     }
 
     /// The residual that this frame keeps to, relative to the largest `|δ|` of its contacts; see
@@ -323,5 +269,7 @@ impl Iterator for Relaxation {
     }
 }
 
-/// How far a step down from a saddle takes the particle that moves most, in units of the smallest radius.
-const LEAVE: f64 = 0.02;
+/// Whether the scene's minimiser ends with Newton's method.
+fn finishes(scene: &Scene) -> bool {
+    scene.minimizer == Minimizer::FireNewton
+}

@@ -26,7 +26,7 @@ impl Relaxation {
         self.velocities.clone_into(&mut frame.velocities);
         let (pairs, forces) = (&mut frame.contacts, &mut frame.forces);
         self.model.copy_contacts(&self.packing, pairs, forces);
-        frame.minimizer = self.state;
+        frame.minimizer = self.mover.numbers();
     }
 
     /// The packing as it stands.
@@ -56,7 +56,7 @@ impl Relaxation {
     /// Simulated time, the sum of the time steps.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.state.time
+        self.mover.time()
     }
 
     /// The largest net force `f_max` (units of γ).
@@ -73,7 +73,7 @@ impl Relaxation {
 
     /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
     pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
-        Observables::of_model(&self.model, &self.packing, self.state.dt, backbone)
+        Observables::of_model(&self.model, &self.packing, self.mover.dt(), backbone)
     }
 
     /// The model with its residual.

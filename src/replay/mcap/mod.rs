@@ -8,7 +8,7 @@ use crate::analysis::METRICS;
 use crate::analysis::Stability;
 use crate::budget::Budget;
 use crate::domain::{Domain, Vec2};
-use crate::minimize::fire::FireState;
+use crate::minimize::recorded;
 use crate::record::messages::{
     ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage, topic,
 };
@@ -272,7 +272,7 @@ fn read_state(bytes: &[u8]) -> Result<Item, String> {
     if !rest.is_empty() {
         return Err("a contact has no j".to_owned());
     }
-    let minimizer = FireState::from_values(&message.minimizer);
+    let minimizer = recorded(&message.minimizer);
     let frame = Frame {
         step: message.step,
         positions: vectors(message.position, "position")?,

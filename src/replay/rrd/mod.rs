@@ -9,7 +9,7 @@ use crate::analysis::METRICS;
 use crate::analysis::Stability;
 use crate::budget::Budget;
 use crate::domain::Vec2;
-use crate::minimize::fire::FireState;
+use crate::minimize::recorded;
 use crate::record::Outcome;
 use crate::state::Frame;
 use crate::text::shown;
@@ -209,7 +209,7 @@ fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
         let missing = |what| format!("no {what} at step {step}");
         let minimizer = minimizers
             .next()
-            .and_then(|values| FireState::from_values(&values))
+            .and_then(|values| recorded(&values))
             .ok_or_else(|| missing("minimiser state"))?;
         let frame = Frame {
             step,
