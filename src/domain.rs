@@ -1,7 +1,8 @@
-//! The periodic box.
+//! The periodic box: the only place that knows how images are found.
 //!
-//! A packing lives on a torus of sides `L_x` × `L_y` (lengths, in units of the small diameter). Positions are kept
-//! wrapped into `0 ≤ x < L_x`, `0 ≤ y < L_y`; the separation of two particles is taken to the nearest image.
+//! A packing lives on a torus whose lattice has the periods `(L_x, 0)` and `(tilt, L_y)` (lengths, in units of the small diameter);
+//! the tilt is what a simple shear makes of an upright box. Positions are kept wrapped into `0 ≤ x < L_x`, `0 ≤ y < L_y`, and what
+//! leaves through the top comes in at the bottom, displaced by `−tilt`.
 //!
 //! See the example of [`Domain`].
 
@@ -10,7 +11,7 @@ use nalgebra::Vector2;
 /// A point or a vector in the plane.
 pub type Vec2 = Vector2<f64>;
 
-/// A periodic rectangle with its corner at the origin.
+/// A periodic box with its corner at the origin.
 ///
 /// # Example
 ///
@@ -26,16 +27,28 @@ pub type Vec2 = Vector2<f64>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
     lengths: Vec2,
+    /// Between `−L_x/2` and `L_x/2`.
+    tilt: f64,
 }
 
 impl Domain {
-    /// A box of sides `length_x` × `length_y`; `None` unless both are positive and finite.
+    /// An upright box of sides `length_x` × `length_y`; `None` unless both are positive and finite.
     #[must_use]
     pub fn new(length_x: f64, length_y: f64) -> Option<Self> {
         let valid = |l: f64| l.is_finite() && l > 0.0;
         (valid(length_x) && valid(length_y)).then_some(Self {
             lengths: Vec2::new(length_x, length_y),
+            tilt: 0.0,
         })
+    }
+
+    /// The box whose upper period is `(tilt, L_y)`: of the tilts that differ by whole `L_x`, which are one lattice, the smallest.
+    /// `None` unless it is finite.
+    #[must_use]
+    pub fn tilted(self, tilt: f64) -> Option<Self> {
+        let side = self.lengths.x;
+        let tilt = tilt - side * libm::round(tilt / side);
+        tilt.is_finite().then_some(Self { tilt, ..self })
     }
 
     /// The sides `(L_x, L_y)`.
@@ -44,7 +57,13 @@ impl Domain {
         self.lengths
     }
 
-    /// The shorter side.
+    /// How far the upper period leans (length), between `−L_x/2` and `L_x/2`.
+    #[must_use]
+    pub fn tilt(&self) -> f64 {
+        self.tilt
+    }
+
+    /// The shorter side. No image but the [nearest](Self::minimum_image) is nearer than half of it.
     #[must_use]
     pub fn shortest(&self) -> f64 {
         self.lengths.x.min(self.lengths.y)
@@ -56,26 +75,86 @@ impl Domain {
         self.lengths.x * self.lengths.y
     }
 
+    /// Whether a position is wrapped.
+    #[must_use]
+    #[inline]
+    pub fn contains(&self, position: Vec2) -> bool {
+        (0.0..self.lengths.x).contains(&position.x) && (0.0..self.lengths.y).contains(&position.y)
+    }
+
     /// The image of `position` with `0 ≤ x < L_x` and `0 ≤ y < L_y`.
     #[must_use]
     #[inline]
     pub fn wrap(&self, position: Vec2) -> Vec2 {
-        Vec2::new(
-            wrap(position.x, self.lengths.x),
-            wrap(position.y, self.lengths.y),
-        )
+        let (l_x, l_y) = (self.lengths.x, self.lengths.y);
+        let y = wrap(position.y, l_y);
+        let mut x = position.x;
+        if self.tilt != 0.0 {
+            x -= self.tilt * libm::round((position.y - y) / l_y);
+        }
+        Vec2::new(wrap(x, l_x), y)
     }
 
-    /// The nearest image of the difference of two *wrapped* positions, each component in `[−L/2, L/2]`.
+    /// The image of the difference of two *wrapped* positions with `|x| ≤ L_x/2` and `|y| ≤ L_y/2`: the nearest, if any is nearer
+    /// than half the [shorter side](Self::shortest).
     ///
     /// `minimum_image(−d) = −minimum_image(d)` holds to the last bit, so a pair's two particles see opposite vectors.
     #[must_use]
     #[inline]
     pub fn minimum_image(&self, difference: Vec2) -> Vec2 {
+        let [x, y] = self.fold([difference.x, difference.y]);
+        Vec2::new(x, y)
+    }
+
+    /// [`minimum_image`](Self::minimum_image) for loops that are compiled for wide vectors: selections instead of branches.
+    #[inline(always)]
+    pub(crate) fn fold(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (l_x, l_y) = (self.lengths.x, self.lengths.y);
+        let half = 0.5 * l_y;
+        let (above, below) = (y > half, y < -half);
+        // Without a tilt 0 is subtracted and added, which the fold of x does as well.
+        let x = x - pick(above, self.tilt) + pick(below, self.tilt);
+        let y = y - pick(above, l_y) + pick(below, l_y);
+        let half = 0.5 * l_x;
+        [x - pick(x > half, l_x) + pick(x < -half, l_x), y]
+    }
+
+    /// The vector of `columns` periods `(L_x, 0)` and `rows` periods `(tilt, L_y)`.
+    #[must_use]
+    pub fn period(&self, columns: i32, rows: i32) -> Vec2 {
+        let (columns, rows) = (f64::from(columns), f64::from(rows));
         Vec2::new(
-            nearest(difference.x, self.lengths.x),
-            nearest(difference.y, self.lengths.y),
+            columns * self.lengths.x + rows * self.tilt,
+            rows * self.lengths.y,
         )
+    }
+
+    /// The box itself (no shift) and the eight around it, by the periods that lead to them.
+    pub(crate) fn around(&self) -> impl Iterator<Item = Vec2> + use<> {
+        let domain = *self;
+        [0, -1, 1]
+            .into_iter()
+            .flat_map(move |columns| [0, -1, 1].map(|rows| domain.period(columns, rows)))
+    }
+
+    /// Where a wrapped position is in the upright box that becomes this one when it is sheared: what a grid of cells sorts by.
+    #[inline]
+    pub(crate) fn upright(&self, position: Vec2) -> Vec2 {
+        if self.tilt == 0.0 {
+            return position;
+        }
+        let x = position.x - self.tilt * (position.y / self.lengths.y);
+        Vec2::new(wrap(x, self.lengths.x), position.y)
+    }
+
+    /// The distances between opposite sides of the sheared box.
+    pub(crate) fn heights(&self) -> Vec2 {
+        let (l_x, l_y) = (self.lengths.x, self.lengths.y);
+        if self.tilt == 0.0 {
+            return self.lengths;
+        }
+        let slanted = (self.tilt * self.tilt + l_y * l_y).sqrt();
+        Vec2::new(l_x * (l_y / slanted), l_y)
     }
 }
 
@@ -107,14 +186,10 @@ fn wrap_outside(x: f64, length: f64) -> f64 {
     }
 }
 
-/// The nearest image of a difference of two coordinates in `[0, length)`.
-#[inline]
-pub(crate) fn nearest(d: f64, length: f64) -> f64 {
-    let half = 0.5 * length;
-    // Selections instead of branches.
-    let above = if d > half { length } else { 0.0 };
-    let below = if d < -half { length } else { 0.0 };
-    d - above + below
+/// `value` where `condition` holds, otherwise 0.
+#[inline(always)]
+fn pick(condition: bool, value: f64) -> f64 {
+    if condition { value } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -145,5 +220,40 @@ mod tests {
             prop_assert!((nearest.norm() - shortest).abs() < 1e-12);
             prop_assert_eq!(domain.minimum_image(-diff), -nearest);
         }
+
+        #[test]
+        fn images_in_a_tilted_box_are_those_of_its_lattice(
+            tilt in -30.0..30.0f64,
+            a in (-20.0..20.0f64, -20.0..20.0f64),
+            b in (-20.0..20.0f64, -20.0..20.0f64),
+        ) {
+            let domain = Domain::new(5.0, 4.0).unwrap().tilted(tilt).unwrap();
+            prop_assert!(domain.tilt().abs() <= 2.5);
+            let is_period = |v: Vec2| {
+                let rows = v.y / 4.0;
+                let columns = (v.x - rows.round() * tilt) / 5.0;
+                (rows - rows.round()).abs() < 1e-9 && (columns - columns.round()).abs() < 1e-9
+            };
+            let [a, b] = [a, b].map(|(x, y)| Vec2::new(x, y));
+            let [p, q] = [a, b].map(|v| domain.wrap(v));
+            prop_assert!(domain.contains(p) && is_period(a - p));
+            let nearest = domain.minimum_image(p - q);
+            prop_assert!(is_period(a - b - nearest));
+            prop_assert!(nearest.x.abs() <= 2.5 && nearest.y.abs() <= 2.0);
+            let shortest = (-3..=3)
+                .flat_map(|m| (-3..=3).map(move |n| domain.period(m, n)))
+                .map(|shift| (p - q + shift).norm())
+                .fold(f64::INFINITY, f64::min);
+            if shortest < 2.0 {
+                prop_assert!((nearest.norm() - shortest).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn image_that_rounds_to_the_far_edge_is_put_on_the_near_one() {
+        let domain = Domain::new(3.0, 2.0).unwrap();
+        assert_eq!(domain.wrap(Vec2::new(-1e-30, 2.0)), Vec2::zeros());
+        assert!(Domain::new(1.0, f64::NAN).is_none() && domain.tilted(f64::INFINITY).is_none());
     }
 }

@@ -370,7 +370,7 @@ fn caption(
 /// Where the box lies on the sheet.
 struct Sheet {
     scale: f64,
-    lengths: Vec2,
+    domain: Domain,
     height: f64,
 }
 
@@ -381,7 +381,7 @@ impl Sheet {
         let scale = (width - 2.0 * MARGIN) / lengths.x;
         Self {
             scale,
-            lengths,
+            domain,
             height: scale * lengths.y + 2.0 * MARGIN,
         }
     }
@@ -392,7 +392,7 @@ impl Sheet {
 
     /// Left, top, width and height of the box.
     fn frame(&self) -> (f64, f64, f64, f64) {
-        let l = self.lengths;
+        let l = self.domain.lengths();
         (MARGIN, MARGIN, self.pixels(l.x), self.pixels(l.y))
     }
 
@@ -409,17 +409,11 @@ impl Sheet {
             least = least.inf(p);
             most = most.sup(p);
         }
-        let l = self.lengths;
-        let mut shifts = Vec::new();
-        for x in [0.0, -l.x, l.x] {
-            for y in [0.0, -l.y, l.y] {
-                let shift = Vec2::new(x, y);
-                let (a, b) = (least + shift, most + shift);
-                if a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0 {
-                    shifts.push(shift);
-                }
-            }
-        }
-        shifts
+        let l = self.domain.lengths();
+        let meets = |shift: &Vec2| {
+            let (a, b) = (least + shift, most + shift);
+            a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0
+        };
+        self.domain.around().filter(meets).collect()
     }
 }

@@ -335,9 +335,9 @@ impl Reached {
 
     /// Whether all positions lie in the box.
     fn within(&self, domain: Domain) -> bool {
-        let lowest = self.lowest[0].inf(&self.lowest[1]).min();
+        let lowest = self.lowest[0].inf(&self.lowest[1]);
         let highest = self.highest[0].sup(&self.highest[1]);
-        lowest >= 0.0 && highest.x < domain.lengths().x && highest.y < domain.lengths().y
+        domain.contains(lowest) && domain.contains(highest)
     }
 
     /// A speed that no particle exceeds, at most √2 times the largest.

@@ -9,7 +9,7 @@
 pub(crate) mod crowding;
 pub(crate) mod octaves;
 
-use crate::domain::{Domain, Vec2, nearest};
+use crate::domain::{Domain, Vec2};
 
 use crate::numerics::wide::wide;
 use crate::state::Packing;
@@ -195,7 +195,7 @@ impl CellList {
                 at,
                 radius,
                 particle,
-                cell: grid.cell(at),
+                cell: grid.cell(packing.domain().upright(at)),
             }));
         let cells = grid.columns * grid.rows;
         let (seats, first) = (&mut self.seats, &mut self.first);
@@ -205,7 +205,6 @@ impl CellList {
     /// Looks once at each two particles of neighbouring cells; says how many pairs were found.
     #[inline(always)]
     fn search(&mut self, domain: Domain, reach: f64, grid: Grid) -> usize {
-        let sides = domain.lengths();
         let mut count = 0;
         for cell in 0..grid.columns * grid.rows {
             let mut ahead = grid
@@ -225,8 +224,8 @@ impl CellList {
                     let mut near = 0;
                     // Without a branch: nobody could guess who is near.
                     for other in others {
-                        let x = nearest(seat.at.x - other.at.x, sides.x);
-                        let y = nearest(seat.at.y - other.at.y, sides.y);
+                        let apart = seat.at - other.at;
+                        let [x, y] = domain.fold([apart.x, apart.y]);
                         let sum = seat.radius + other.radius + reach;
                         let (i, j) = (seat.particle, other.particle);
                         slots[near] = [i.min(j), i.max(j)];
@@ -320,7 +319,7 @@ impl Grid {
     fn new(domain: Domain, width: f64, particles: usize) -> Option<Self> {
         let most = libm::ceil((particles as f64).sqrt()).max(3.0);
         let count = |length: f64| libm::floor(length / width).min(most);
-        let (columns, rows) = (count(domain.lengths().x), count(domain.lengths().y));
+        let (columns, rows) = (count(domain.heights().x), count(domain.heights().y));
         (columns >= 3.0 && rows >= 3.0).then(|| Self {
             columns: columns as usize,
             rows: rows as usize,
@@ -328,6 +327,7 @@ impl Grid {
         })
     }
 
+    /// The cell of a place in the upright box.
     fn cell(&self, p: Vec2) -> u32 {
         let at = p.component_mul(&self.per_length);
         // A product may round up to the number of cells.

@@ -17,6 +17,7 @@ pub(crate) struct Seat {
 /// Particles of about one size in cells no narrower than two of them, whose surfaces are `reach` apart, have from centre to centre: `O(N)`
 /// cells at most.
 pub(crate) struct Grid {
+    domain: Domain,
     columns: usize,
     rows: usize,
     per_length: Vec2,
@@ -46,16 +47,17 @@ impl Grid {
         let largest = particles
             .iter()
             .fold(0.0, |m: f64, seat| m.max(seat.radius));
-        let lengths = domain.lengths();
+        let heights = domain.heights();
         // A float too large for the type becomes the largest number there is.
         let count =
             |length: f64, most: usize| ((length / (2.0 * largest + reach)) as usize).clamp(1, most);
-        let columns = count(lengths.x, particles.len());
-        let rows = count(lengths.y, particles.len().div_ceil(columns));
+        let columns = count(heights.x, particles.len());
+        let rows = count(heights.y, particles.len().div_ceil(columns));
         let mut grid = Self {
+            domain,
             columns,
             rows,
-            per_length: Vec2::new(columns as f64, rows as f64).component_div(&lengths),
+            per_length: Vec2::new(columns as f64, rows as f64).component_div(&domain.lengths()),
             seats: vec![Seat::default(); particles.len()],
             first: vec![0; columns * rows + 1],
         };
@@ -94,7 +96,7 @@ impl Grid {
     }
 
     fn place(&self, at: Vec2) -> (usize, usize) {
-        let at = at.component_mul(&self.per_length);
+        let at = self.domain.upright(at).component_mul(&self.per_length);
         let (column, row) = (at.x as usize, at.y as usize);
         // A product may round up to the number of cells.
         (column.min(self.columns - 1), row.min(self.rows - 1))

@@ -33,7 +33,7 @@ pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each:
     }
     let double = |&[x, y]: &[f32; 2]| Vec2::new(x.into(), y.into());
     let (least, most) = (double(&least), double(&most));
-    around(l, least, most, |shift| {
+    around(domain, least, most, |shift| {
         let inside = |v: &[f32; 2]| {
             let v = double(v) + shift;
             let (x, y) = (v.x, v.y);
@@ -48,7 +48,7 @@ pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each:
 /// The shifts by a period that bring a part of `segment` into the open box, but for none at all.
 pub(super) fn shifts_of_segment(domain: Domain, &[a, b]: &[Vec2; 2], mut each: impl FnMut(Vec2)) {
     let l = domain.lengths();
-    around(l, a.inf(&b), a.sup(&b), |shift| {
+    around(domain, a.inf(&b), a.sup(&b), |shift| {
         // Two convex shapes are apart if one of their sides separates them: for the sides of the box `around` has asked.
         let middle = 0.5 * (a + b) + shift - 0.5 * l;
         let half = 0.5 * (b - a);
@@ -60,17 +60,15 @@ pub(super) fn shifts_of_segment(domain: Domain, &[a, b]: &[Vec2; 2], mut each: i
 }
 
 /// The shifts by a period that bring the rectangle between `least` and `most` into the open box, but for none at all.
-fn around(l: Vec2, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2)) {
+fn around(domain: Domain, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2)) {
+    let l = domain.lengths();
     if least.x >= 0.0 && least.y >= 0.0 && most.x <= l.x && most.y <= l.y {
         return;
     }
-    for x in [0.0, -l.x, l.x] {
-        for y in [0.0, -l.y, l.y] {
-            let meets =
-                least.x + x < l.x && least.y + y < l.y && most.x + x > 0.0 && most.y + y > 0.0;
-            if meets && (x != 0.0 || y != 0.0) {
-                each(Vec2::new(x, y));
-            }
+    for shift in domain.around().skip(1) {
+        let (a, b) = (least + shift, most + shift);
+        if a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0 {
+            each(shift);
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
 use crate::analysis::{Backbone, sum_of_forces};
-use crate::domain::{Domain, Vec2, nearest};
+use crate::domain::{Domain, Vec2};
 use crate::numerics::wide::wide;
 use crate::state::Frame;
 
@@ -104,7 +104,7 @@ impl Redraw {
 
     /// Whether no particle has moved too far.
     fn stand(&self, before: &[Vec2], now: &[Vec2]) -> bool {
-        let (l, most) = (self.domain.lengths(), self.distance * self.distance);
+        let (domain, most) = (self.domain, self.distance * self.distance);
         // At 0 a picture is left out for no reason, however alike.
         self.distance > 0.0
             && all(
@@ -112,7 +112,7 @@ impl Redraw {
                 now,
                 #[inline(always)]
                 |a: &Vec2, b: &Vec2| {
-                    let (x, y) = (nearest(b.x - a.x, l.x), nearest(b.y - a.y, l.y));
+                    let [x, y] = domain.fold([b.x - a.x, b.y - a.y]);
                     x * x + y * y <= most
                 },
             )

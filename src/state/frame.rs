@@ -229,17 +229,18 @@ impl Frame {
             "minimiser value",
             &mut self.minimizer.values().iter().copied(),
         )?;
-        let l = domain.lengths();
-        for (index, p) in self.positions.iter().enumerate() {
-            for (value, length) in [(p.x, l.x), (p.y, l.y)] {
-                if !(0.0..length).contains(&value) {
-                    return Err(FrameError::Value {
-                        what: "position of particle",
-                        index,
-                        value,
-                    });
-                }
-            }
+        let outside = |(_, p): &(usize, &Vec2)| !domain.contains(**p);
+        if let Some((index, p)) = self.positions.iter().enumerate().find(outside) {
+            let value = if (0.0..domain.lengths().x).contains(&p.x) {
+                p.y
+            } else {
+                p.x
+            };
+            return Err(FrameError::Value {
+                what: "position of particle",
+                index,
+                value,
+            });
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::stiffness_sum;
 use crate::contacts::largest_force;
-use crate::domain::{Vec2, nearest};
+use crate::domain::{Domain, Vec2};
 use crate::numerics::wide::wide;
 use crate::state::Packing;
 
@@ -84,7 +84,7 @@ fn add_fours(
     net: &mut [Vec2],
 ) {
     let positions = packing.positions();
-    let sides = packing.domain().lengths();
+    let domain = packing.domain();
     let mut under_way = [Four::default(); UNDER_WAY];
     // Pairs of one particle follow each other: its sum stays out of memory until they end.
     let (mut first, mut sum_of_first) = (0, Vec2::zeros());
@@ -94,7 +94,7 @@ fn add_fours(
             under_way[step % UNDER_WAY].separate(positions, pairs);
         }
         if let Some(place) = place(1) {
-            under_way[place % UNDER_WAY].take_nearest_images(sides);
+            under_way[place % UNDER_WAY].take_nearest_images(domain);
         }
         if let Some(place) = place(2) {
             under_way[place % UNDER_WAY].take_roots();
@@ -142,11 +142,11 @@ impl Four {
     }
 
     #[inline(always)]
-    fn take_nearest_images(&mut self, sides: Vec2) {
+    fn take_nearest_images(&mut self, domain: Domain) {
         let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
         for k in 0..4 {
-            x[k] = nearest(self.separation[k].x, sides.x);
-            y[k] = nearest(self.separation[k].y, sides.y);
+            let apart = self.separation[k];
+            [x[k], y[k]] = domain.fold([apart.x, apart.y]);
         }
         for k in 0..4 {
             self.distance[k] = x[k] * x[k] + y[k] * y[k];
@@ -186,7 +186,6 @@ impl Four {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::Domain;
     use core::f64::consts::PI;
     use proptest::prelude::*;
 

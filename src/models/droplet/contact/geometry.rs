@@ -1,7 +1,7 @@
 //! Where the contacts of a list are: normals, distances, overlaps, and the directions seen from each particle.
 
 use super::list::{ContactList, DuplicateContactList};
-use crate::domain::{Vec2, nearest};
+use crate::domain::Vec2;
 use crate::models::droplet::kernel::{Angles, Direction};
 use crate::numerics::wide::wide;
 use crate::state::{Packing, unit_and_length};
@@ -263,7 +263,7 @@ impl Part<'_> {
     #[inline(always)]
     pub(crate) fn refresh(self, packing: &Packing, pairs: &[[u32; 2]]) {
         let (positions, radii) = (packing.positions(), packing.radii());
-        let sides = packing.domain().lengths();
+        let domain = packing.domain();
         let angles = Angles::new();
         for column in [&mut self.room.x, &mut self.room.y] {
             column.resize(TOGETHER, 0.0);
@@ -285,11 +285,8 @@ impl Part<'_> {
                 *overlap = radii[i] + radii[j];
             }
             // One simple loop a quantity, so that each is done several contacts at a time.
-            for x in &mut *x {
-                *x = nearest(*x, sides.x);
-            }
-            for y in &mut *y {
-                *y = nearest(*y, sides.y);
+            for (x, y) in x.iter_mut().zip(&mut *y) {
+                [*x, *y] = domain.fold([*x, *y]);
             }
             for ((r, x), y) in distances.iter_mut().zip(&*x).zip(&*y) {
                 *r = (x * x + y * y).sqrt();

@@ -78,7 +78,7 @@ fn farther_images(
     j: usize,
     reach: f64,
 ) -> impl Iterator<Item = Vec2> + use<> {
-    let l = packing.domain().lengths();
+    let (domain, l) = (packing.domain(), packing.domain().lengths());
     let nearest = packing.separation(i, j);
     // A reach is capped by the caller; the cap here only keeps a wrong one from a long loop.
     let count = |side: f64| libm::ceil(reach / side).clamp(1.0, 16.0) as i32;
@@ -86,6 +86,6 @@ fn farther_images(
     (-columns..=columns)
         .flat_map(move |x| (-rows..=rows).map(move |y| (x, y)))
         .filter(|image| *image != (0, 0))
-        .map(move |(x, y)| nearest + Vec2::new(f64::from(x) * l.x, f64::from(y) * l.y))
+        .map(move |(x, y)| nearest + domain.period(x, y))
         .filter(move |separation| separation.norm_squared() < reach * reach)
 }
