@@ -1,27 +1,26 @@
 //! Rows of values, one cell of `W` numbers for each instance of an entity.
 
 use super::columns::{Column, lists, offsets};
-use super::memory::Values;
 use rerun::ComponentDescriptor;
 use rerun::external::arrow::array::{
     Array as _, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, StringArray, UInt8Array,
     UInt32Array,
 };
-use rerun::external::arrow::buffer::{Buffer, ScalarBuffer};
+use rerun::external::arrow::buffer::Buffer;
 use rerun::external::arrow::datatypes::{ArrowNativeType, Field};
 use std::io;
 use std::sync::Arc;
 
 /// A number that a cell holds.
 pub(super) trait Number: ArrowNativeType {
-    fn array(values: Buffer) -> ArrayRef;
+    fn array(values: Vec<Self>) -> ArrayRef;
 }
 
 macro_rules! numbers {
     ($($number:ty: $array:ty),*) => {$(
         impl Number for $number {
-            fn array(values: Buffer) -> ArrayRef {
-                Arc::new(<$array>::new(ScalarBuffer::from(values), None))
+            fn array(values: Vec<Self>) -> ArrayRef {
+                Arc::new(<$array>::from(values))
             }
         }
     )*};
@@ -31,7 +30,7 @@ numbers!(f32: Float32Array, f64: Float64Array, u32: UInt32Array, u8: UInt8Array)
 
 /// Cells in the making; their rows are those of the strips or points beside which they stand.
 pub(super) struct Cells<T: Number, const W: usize> {
-    values: Values<T, W>,
+    values: Vec<[T; W]>,
     /// Where the cells of each row end.
     rows: Vec<usize>,
 }
@@ -39,21 +38,13 @@ pub(super) struct Cells<T: Number, const W: usize> {
 impl<T: Number, const W: usize> Default for Cells<T, W> {
     fn default() -> Self {
         Self {
-            values: Values::default(),
+            values: Vec::new(),
             rows: Vec::new(),
         }
     }
 }
 
 impl<T: Number, const W: usize> Cells<T, W> {
-    /// Room for as much as `other` holds.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            values: Values::with_room_of(&other.values),
-            rows: Vec::with_capacity(other.rows.len()),
-        }
-    }
-
     /// Adds a cell to the row at hand.
     pub fn push(&mut self, cell: [T; W]) {
         self.values.push(cell);
@@ -72,7 +63,7 @@ impl<T: Number, const W: usize> Cells<T, W> {
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let rows = offsets(&self.rows)?;
-        let mut values = T::array(self.values.into_buffer());
+        let mut values = T::array(self.values.into_flattened());
         if W > 1 {
             let item = Arc::new(Field::new("item", values.data_type().clone(), false));
             values = Arc::new(FixedSizeListArray::new(item, W as i32, values, None));
@@ -85,7 +76,7 @@ impl<T: Number, const W: usize> Cells<T, W> {
 #[derive(Default)]
 pub(super) struct Texts {
     /// ASCII.
-    text: Values<u8, 1>,
+    text: Vec<u8>,
     /// Where each text ends.
     ends: Vec<usize>,
     /// Where the texts of each row end.
@@ -93,15 +84,6 @@ pub(super) struct Texts {
 }
 
 impl Texts {
-    /// Room for as much as `other` holds.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            text: Values::with_room_of(&other.text),
-            ends: Vec::with_capacity(other.ends.len()),
-            rows: Vec::with_capacity(other.rows.len()),
-        }
-    }
-
     /// Adds to the text at hand.
     pub fn push(&mut self, text: &str) {
         self.extend(text.as_bytes());
@@ -122,7 +104,7 @@ impl Texts {
     }
 
     fn extend(&mut self, ascii: &[u8]) {
-        self.text.extend_from_slice(ascii.as_chunks().0);
+        self.text.extend_from_slice(ascii);
     }
 
     /// Adds a number to the text at hand, rounded to three digits: `0.0346`, `12.3`, `461`, `4.61e-8`. The general way to
@@ -174,7 +156,7 @@ impl Texts {
     /// The component of all rows.
     pub fn into_column(self, descriptor: ComponentDescriptor) -> io::Result<Column> {
         let (ends, rows) = (offsets(&self.ends)?, offsets(&self.rows)?);
-        let texts = StringArray::try_new(ends, self.text.into_buffer(), None);
+        let texts = StringArray::try_new(ends, Buffer::from(self.text), None);
         let texts = texts.map_err(io::Error::other)?;
         Ok((descriptor, lists(rows, Arc::new(texts))))
     }
@@ -204,7 +186,7 @@ mod tests {
         let printed = |x| {
             let mut texts = Texts::default();
             texts.push_number(x);
-            String::from_utf8(texts.text.as_flattened().to_vec()).unwrap()
+            String::from_utf8(texts.text).unwrap()
         };
         for (x, text) in [
             (0.0, "0"),
@@ -241,6 +223,6 @@ mod tests {
             texts.push_count(n);
             texts.push(" ");
         }
-        assert_eq!(texts.text.as_flattened(), b"0 7 10 4294967295 ");
+        assert_eq!(texts.text, b"0 7 10 4294967295 ");
     }
 }

@@ -1,7 +1,6 @@
 //! Rows of line strips, gathered component by component: what a viewer gets most bytes of is copied least.
 
 use super::cells::Number as _;
-use super::memory::Values;
 use super::pictures::{Network, Rgb};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
@@ -35,34 +34,35 @@ pub(super) struct StripRows {
     rows: Vec<usize>,
     /// Where the points of each strip end.
     strips: Vec<usize>,
-    points: Values<f32, 2>,
-    colors: Values<u32, 1>,
-    radii: Values<f32, 1>,
+    points: Vec<[f32; 2]>,
+    colors: Vec<u32>,
+    radii: Vec<f32>,
 }
 
 impl StripRows {
-    /// Room for as much as `other` holds: one batch is like the next.
-    pub fn with_room_of(other: &Self) -> Self {
+    /// No rows, and room for so many vertices.
+    pub fn with_room_for(vertices: usize) -> Self {
         Self {
-            times: Vec::with_capacity(other.times.len()),
-            rows: Vec::with_capacity(other.rows.len()),
-            strips: Vec::with_capacity(other.strips.len()),
-            points: Values::with_room_of(&other.points),
-            colors: Values::with_room_of(&other.colors),
-            radii: Values::with_room_of(&other.radii),
+            points: Vec::with_capacity(vertices + vertices / 8),
+            ..Self::default()
         }
+    }
+
+    /// Vertices of all strips.
+    pub fn vertices(&self) -> usize {
+        self.points.len()
     }
 
     /// Adds a strip to the row at hand.
     pub fn strip(&mut self, points: impl IntoIterator<Item = [f32; 2]>, color: Rgb) {
         self.points.extend(points);
         self.strips.push(self.points.len());
-        self.colors.push([rgba(color)]);
+        self.colors.push(rgba(color));
     }
 
     /// Half the width of the strip added last (length); either all strips of an entity have one or none.
     pub fn half_width(&mut self, half_width: f64) {
-        self.radii.push([half_width as f32]);
+        self.radii.push(half_width as f32);
     }
 
     /// Adds the closed contours of all particles to the row at hand: their number of vertices. `each` is told particle,
@@ -80,7 +80,7 @@ impl StripRows {
             |points, first, extent| {
                 points.push(points[first]);
                 strips.push(points.len());
-                colors.push([rgba(each(p, &points[first..], extent))]);
+                colors.push(rgba(each(p, &points[first..], extent)));
                 p += 1;
             },
         );
@@ -96,9 +96,9 @@ impl StripRows {
             .extend(network.segments.as_flattened().iter().map(single));
         let relative = network.relative.iter();
         self.colors
-            .extend(relative.clone().map(|&r| [rgba(Network::color(r))]));
+            .extend(relative.clone().map(|&r| rgba(Network::color(r))));
         self.radii
-            .extend(relative.map(|&r| [network.half_width(r) as f32]));
+            .extend(relative.map(|&r| network.half_width(r) as f32));
     }
 
     /// Closes the row at hand.
@@ -111,7 +111,8 @@ impl StripRows {
     pub fn into_columns(self) -> io::Result<Vec<Column>> {
         let rows = offsets(&self.rows)?;
         let point = Arc::new(Field::new("item", DataType::Float32, false));
-        let points = FixedSizeListArray::new(point, 2, f32::array(self.points.into_buffer()), None);
+        let points =
+            FixedSizeListArray::new(point, 2, f32::array(self.points.into_flattened()), None);
         let item = Arc::new(Field::new("item", points.data_type().clone(), false));
         let strips = ListArray::new(item, offsets(&self.strips)?, array(points), None);
         let mut columns = vec![
@@ -121,11 +122,11 @@ impl StripRows {
             ),
             (
                 LineStrips2D::descriptor_colors(),
-                lists(rows.clone(), u32::array(self.colors.into_buffer())),
+                lists(rows.clone(), u32::array(self.colors)),
             ),
         ];
         if !self.radii.is_empty() {
-            let radii = lists(rows, f32::array(self.radii.into_buffer()));
+            let radii = lists(rows, f32::array(self.radii));
             columns.push((LineStrips2D::descriptor_radii(), radii));
         }
         Ok(columns)

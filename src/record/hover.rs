@@ -24,15 +24,6 @@ pub(super) struct ParticleRows {
 }
 
 impl ParticleRows {
-    /// Room for as much as `other` holds: one batch is like the next.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            centres: Cells::with_room_of(&other.centres),
-            colors: Cells::with_room_of(&other.colors),
-            numbers: Texts::with_room_of(&other.numbers),
-        }
-    }
-
     /// Adds the next particle, number `p`, at `centre`, with the colour of its contour and its deepest dent relative to its
     /// undeformed radius: `p 0.125, Z 5, dent 0.0346`; `line_tension` is γ.
     pub fn particle(
@@ -86,15 +77,6 @@ pub(super) struct ContactRows {
 }
 
 impl ContactRows {
-    /// Room for as much as `other` holds: one batch is like the next.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            pairs: Cells::with_room_of(&other.pairs),
-            forces: Cells::with_room_of(&other.forces),
-            overlaps: Cells::with_room_of(&other.overlaps),
-        }
-    }
-
     /// Adds a row; `line_tension` is γ.
     pub fn row(&mut self, contacts: &Contacts<'_>, line_tension: f64) {
         for (c, &pair) in contacts.pairs.iter().enumerate() {

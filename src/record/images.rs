@@ -85,14 +85,6 @@ pub(super) struct ImageRows {
 }
 
 impl ImageRows {
-    /// Room for as much as `other` holds: one batch is like the next.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            strips: StripRows::with_room_of(&other.strips),
-            of: Cells::with_room_of(&other.of),
-        }
-    }
-
     /// Adds the image of `points` of number `of`, moved by `shift`; `points` have the colour `rgb`.
     pub fn image(&mut self, points: &[[f32; 2]], shift: Vec2, rgb: Rgb, of: usize) {
         let moved = |&[x, y]: &[f32; 2]| {

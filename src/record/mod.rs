@@ -31,7 +31,6 @@ mod legend;
 mod legs;
 mod live;
 mod mcap;
-mod memory;
 pub(crate) mod messages;
 mod patience;
 mod pictures;

@@ -103,14 +103,9 @@ impl Rows {
 
     /// The batch at hand, which ends with it.
     pub fn batch(&mut self) -> Batch {
+        // One batch is like the next, and contours are half of it.
         let next = Batch {
-            contours: StripRows::with_room_of(&self.pending.contours),
-            contour_images: ImageRows::with_room_of(&self.pending.contour_images),
-            particles: ParticleRows::with_room_of(&self.pending.particles),
-            contacts: StripRows::with_room_of(&self.pending.contacts),
-            contact_images: ImageRows::with_room_of(&self.pending.contact_images),
-            contact_numbers: ContactRows::with_room_of(&self.pending.contact_numbers),
-            states: StateRows::with_room_of(&self.pending.states),
+            contours: StripRows::with_room_for(self.pending.contours.vertices()),
             ..Batch::default()
         };
         core::mem::replace(&mut self.pending, next)

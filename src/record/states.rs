@@ -20,19 +20,6 @@ pub(super) struct StateRows {
 }
 
 impl StateRows {
-    /// Room for as much as `other` holds: one batch is like the next.
-    pub fn with_room_of(other: &Self) -> Self {
-        Self {
-            times: Vec::with_capacity(other.times.len()),
-            positions: Cells::with_room_of(&other.positions),
-            velocities: Cells::with_room_of(&other.velocities),
-            contacts: Cells::with_room_of(&other.contacts),
-            forces: Cells::with_room_of(&other.forces),
-            minimizers: Cells::with_room_of(&other.minimizers),
-            digests: Cells::with_room_of(&other.digests),
-        }
-    }
-
     /// Adds the state of a frame and its digest.
     pub fn row(&mut self, nanoseconds: i64, frame: &Frame, digest: &[u8; 32]) {
         let components = |v: &Vec2| [v.x, v.y];
