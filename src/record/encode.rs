@@ -4,7 +4,7 @@
 //! one piece, so that a full disk shows at the message that hit it, and the stores and fields of the footer are sorted,
 //! where rerun's own encoder takes them from a hash map.
 
-use super::ipc::{self, Ipc, Pieces};
+use super::ipc::{self, Pieces};
 use prost::Message as _;
 use prost::encoding::{WireType, encode_key, encode_varint};
 use re_protos::common::v1alpha1::Compression as Compressed;
@@ -63,7 +63,6 @@ pub(super) struct Encoder<W> {
     /// Bytes of the whole messages written so far.
     written: u64,
     buffer: Vec<u8>,
-    ipc: Ipc,
     /// What the footer will list; a stream without one may go on for ever.
     manifests: Option<Vec<(StoreId, RrdManifestBuilder)>>,
     ids: u128,
@@ -101,7 +100,6 @@ impl<W: Write> Encoder<W> {
             sink,
             written: buffer.len() as u64,
             buffer,
-            ipc: Ipc::default(),
             manifests,
             ids: 0,
         })
@@ -157,8 +155,7 @@ impl<W: Write> Encoder<W> {
     /// Writes a chunk into a store.
     pub fn append(&mut self, store: &StoreId, chunk: &Chunk) -> io::Result<()> {
         let batch = chunk.to_chunk_batch().map_err(io::Error::other)?;
-        let pieces = self.ipc.pieces(&batch).map_err(io::Error::other)?;
-        let place = match pieces {
+        let place = match Pieces::of(&batch).map_err(io::Error::other)? {
             Some(pieces) => self.message_in_pieces(store, &batch, &pieces)?,
             None => self.message(&LogMsg::ArrowMsg(store.clone(), whole(&batch)))?,
         };
@@ -352,7 +349,7 @@ mod tests {
         for (rows, empty) in [(4, false), (1, false), (300, false), (5, true), (2, false)] {
             let chunk = chunk(&mut chunks, rows, empty);
             let batch = chunk.to_chunk_batch().unwrap();
-            let taken = pieces.ipc.pieces(&batch).unwrap();
+            let taken = Pieces::of(&batch).unwrap();
             assert_eq!(taken.is_some(), !empty);
             pieces.append(&store, &chunk).unwrap();
             let message = LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg().unwrap());

@@ -2,23 +2,23 @@
 //!
 //! Arrow's writer copies all values behind each other, rerun's encoder copies the result into a message, and that into a
 //! buffer. Here a message is a list of pieces: what stands around the values, and the values where they are. The bytes are
-//! those of the two libraries. The schema is written by Arrow itself. The description of the values (a flatbuffer, whose layout
-//! depends on the number of arrays and buffers alone) is Arrow's own of one row, with the numbers of this batch put in.
+//! those of the two libraries. The schema is written by Arrow itself, and the description of the values by Arrow's builders.
 
+use flatbuffers::FlatBufferBuilder;
 use rerun::external::arrow::array::{Array as _, ArrayData, RecordBatch};
 use rerun::external::arrow::buffer::Buffer;
 use rerun::external::arrow::datatypes::DataType;
 use rerun::external::arrow::error::ArrowError;
-use rerun::external::arrow::ipc::writer::StreamWriter;
+use rerun::external::arrow::ipc;
+use rerun::external::arrow::ipc::writer::{
+    EncodedData, IpcWriteOptions, StreamWriter, write_message,
+};
 
 /// Buffers begin at multiples of this many bytes of the values.
 const ALIGNMENT: usize = 64;
 
 /// What ends an Arrow stream: a message of no length.
 pub(super) const END: [u8; 8] = [0xff, 0xff, 0xff, 0xff, 0, 0, 0, 0];
-
-/// Marks the beginning of a message, before its length.
-const CONTINUATION: usize = 8;
 
 /// A record batch as pieces of a stream, without its [`END`].
 pub(super) struct Pieces {
@@ -28,29 +28,14 @@ pub(super) struct Pieces {
     pub buffers: Vec<Buffer>,
 }
 
-impl Pieces {
-    /// Length of the stream with its end (bytes).
-    pub fn len(&self) -> usize {
-        let values: usize = self.buffers.iter().map(|b| padded(b.len())).sum();
-        self.head.len() + values + END.len()
-    }
-}
-
 /// What `length` bytes take up.
 pub(super) fn padded(length: usize) -> usize {
     length.next_multiple_of(ALIGNMENT)
 }
 
-/// Makes [`Pieces`].
-#[derive(Default)]
-pub(super) struct Ipc {
-    /// Descriptions of one row by the numbers of arrays and buffers.
-    descriptions: Vec<([usize; 2], Vec<u8>)>,
-}
-
-impl Ipc {
+impl Pieces {
     /// The pieces of `batch`; `None` if it holds what is not written here: nulls, slices, lists of nothing, other types.
-    pub fn pieces(&mut self, batch: &RecordBatch) -> Result<Option<Pieces>, ArrowError> {
+    pub fn of(batch: &RecordBatch) -> Result<Option<Self>, ArrowError> {
         let (mut lengths, mut buffers) = (Vec::new(), Vec::new());
         for column in batch.columns() {
             if gather(&column.to_data(), &mut lengths, &mut buffers).is_none() {
@@ -59,29 +44,19 @@ impl Ipc {
         }
         let mut head = Vec::with_capacity(8192);
         StreamWriter::try_new(&mut head, batch.schema_ref())?;
-        let start = head.len();
-        let counts = [lengths.len(), buffers.len()];
-        let known = self.descriptions.iter().position(|(c, _)| *c == counts);
-        let known = if let Some(known) = known {
-            known
-        } else {
-            let one = description_of_one(&batch.slice(0, 1), start)?;
-            self.descriptions.push((counts, one));
-            self.descriptions.len() - 1
+        let description = EncodedData {
+            ipc_message: description(batch.num_rows(), &lengths, &buffers),
+            arrow_data: Vec::new(),
         };
-        head.extend_from_slice(&self.descriptions[known].1);
-        let put = put(&mut head[start..], batch.num_rows(), &lengths, &buffers);
-        Ok(put.map(|()| Pieces { head, buffers }))
+        write_message(&mut head, description, &IpcWriteOptions::default())?;
+        Ok(Some(Self { head, buffers }))
     }
-}
 
-/// The message that describes the values of `one`, with its continuation mark; `start` bytes are the schema's.
-fn description_of_one(one: &RecordBatch, start: usize) -> Result<Vec<u8>, ArrowError> {
-    let mut bytes = Vec::new();
-    StreamWriter::try_new(&mut bytes, one.schema_ref())?.write(one)?;
-    let length = u32_at(&bytes, start + 4).unwrap_or(0);
-    bytes.truncate(start + CONTINUATION + length);
-    Ok(bytes.split_off(start))
+    /// Length of the stream with its end (bytes).
+    pub fn len(&self) -> usize {
+        let values: usize = self.buffers.iter().map(|b| padded(b.len())).sum();
+        self.head.len() + values + END.len()
+    }
 }
 
 /// Appends length and buffers of an array and of those within it, in Arrow's order.
@@ -123,52 +98,31 @@ fn gather(data: &ArrayData, lengths: &mut Vec<usize>, buffers: &mut Vec<Buffer>)
     }
 }
 
-/// Puts the numbers of a batch into the description of another: its rows, lengths and buffers; `None` if it is no
-/// description of so many.
-fn put(message: &mut [u8], rows: usize, lengths: &[usize], buffers: &[Buffer]) -> Option<()> {
-    let flat = message.get_mut(CONTINUATION..)?;
-    let root = u32_at(flat, 0)?;
-    let (body, batch) = (field(flat, root, 3)?, field(flat, root, 2)?);
-    let batch = batch + u32_at(flat, batch)?;
-    let (length, arrays, places) = (
-        field(flat, batch, 0)?,
-        field(flat, batch, 1)?,
-        field(flat, batch, 2)?,
-    );
-    let arrays = arrays + u32_at(flat, arrays)?;
-    let places = places + u32_at(flat, places)?;
-    if u32_at(flat, arrays)? != lengths.len() || u32_at(flat, places)? != buffers.len() {
-        return None;
-    }
-    let mut set = |at: usize, value: usize| {
-        let bytes = flat.get_mut(at..at + 8)?;
-        bytes.copy_from_slice(&(value as u64).to_le_bytes());
-        Some(())
-    };
-    set(length, rows)?;
-    for (k, length) in lengths.iter().enumerate() {
-        set(arrays + 4 + 16 * k, *length)?;
-        set(arrays + 12 + 16 * k, 0)?;
-    }
-    let mut offset = 0;
-    for (k, buffer) in buffers.iter().enumerate() {
-        set(places + 4 + 16 * k, offset)?;
-        set(places + 12 + 16 * k, buffer.len())?;
-        offset += padded(buffer.len());
-    }
-    set(body, offset)
-}
-
-/// Where a flatbuffer's table at `table` has its field of number `number`; `None` if it has the default value.
-fn field(flat: &[u8], table: usize, number: usize) -> Option<usize> {
-    let back = u32_at(flat, table)? as u32 as i32;
-    let entry = usize::try_from(table as i64 - i64::from(back)).ok()? + 4 + 2 * number;
-    let offset = flat.get(entry..entry + 2)?;
-    let offset = u16::from_le_bytes(offset.try_into().ok()?);
-    (offset != 0).then_some(table + usize::from(offset))
-}
-
-fn u32_at(bytes: &[u8], at: usize) -> Option<usize> {
-    let bytes = bytes.get(at..at + 4)?;
-    Some(u32::from_le_bytes(bytes.try_into().ok()?) as usize)
+/// Arrow's description of the values of a batch: its rows, the lengths of its arrays, and where their buffers lie.
+fn description(rows: usize, lengths: &[usize], buffers: &[Buffer]) -> Vec<u8> {
+    let mut builder = FlatBufferBuilder::new();
+    let mut end = 0;
+    let places = buffers.iter().map(|buffer| {
+        let start = end;
+        end += padded(buffer.len());
+        ipc::Buffer::new(start as i64, buffer.len() as i64)
+    });
+    let places: Vec<ipc::Buffer> = places.collect();
+    let nodes = lengths.iter().map(|n| ipc::FieldNode::new(*n as i64, 0));
+    let nodes: Vec<ipc::FieldNode> = nodes.collect();
+    let places = builder.create_vector(&places);
+    let nodes = builder.create_vector(&nodes);
+    let mut batch = ipc::RecordBatchBuilder::new(&mut builder);
+    batch.add_length(rows as i64);
+    batch.add_nodes(nodes);
+    batch.add_buffers(places);
+    let batch = batch.finish().as_union_value();
+    let mut message = ipc::MessageBuilder::new(&mut builder);
+    message.add_version(ipc::MetadataVersion::V5);
+    message.add_header_type(ipc::MessageHeader::RecordBatch);
+    message.add_bodyLength(end as i64);
+    message.add_header(batch);
+    let message = message.finish();
+    builder.finish(message, None);
+    builder.finished_data().to_vec()
 }
