@@ -28,16 +28,9 @@ pub struct Closing {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    snapshots: VecDeque<Entry>,
+    snapshots: VecDeque<Arc<Snapshot>>,
     bytes: usize,
     offered: u64,
-}
-
-/// A snapshot, and whether it is all that was recorded of its step.
-#[derive(Debug)]
-pub struct Entry {
-    pub snapshot: Arc<Snapshot>,
-    pub whole: bool,
 }
 
 impl Queue {
@@ -58,10 +51,7 @@ impl Queue {
         while waiting.bytes + bytes > LIMIT && !waiting.snapshots.is_empty() {
             waiting.thin();
         }
-        waiting.push(Entry {
-            snapshot,
-            whole: true,
-        });
+        waiting.push(snapshot);
         drop(waiting);
         self.arrived.notify_one();
     }
@@ -72,11 +62,11 @@ impl Queue {
     }
 
     /// The snapshot that has waited longest.
-    pub fn take(&self) -> Option<Entry> {
+    pub fn take(&self) -> Option<Arc<Snapshot>> {
         let mut waiting = self.waiting();
-        let entry = waiting.snapshots.pop_front()?;
-        waiting.bytes -= size(&entry.snapshot);
-        Some(entry)
+        let snapshot = waiting.snapshots.pop_front()?;
+        waiting.bytes -= size(&snapshot);
+        Some(snapshot)
     }
 
     /// Drops everything but the newest snapshot.
@@ -128,53 +118,43 @@ impl Queue {
 }
 
 impl Waiting {
-    fn push(&mut self, entry: Entry) {
-        self.bytes += size(&entry.snapshot);
-        self.snapshots.push_back(entry);
+    fn push(&mut self, snapshot: Arc<Snapshot>) {
+        self.bytes += size(&snapshot);
+        self.snapshots.push_back(snapshot);
     }
 
     /// Takes every other frame away, and leaves its metrics; where no two frames are left, every other snapshot. So what
     /// is left is thinner the older it is, and a pass is rare.
     fn thin(&mut self) {
-        let entries = core::mem::take(&mut self.snapshots);
+        let snapshots = core::mem::take(&mut self.snapshots);
         self.bytes = 0;
-        let frames = entries.iter().filter(|e| e.snapshot.frame.is_some());
+        let frames = snapshots.iter().filter(|s| s.frame.is_some());
         if frames.count() > 1 {
             let mut keep = false;
-            for entry in entries {
-                keep ^= entry.snapshot.frame.is_some();
-                if entry.snapshot.frame.is_none() || keep {
-                    self.push(entry);
-                } else if entry.snapshot.metrics.is_some() {
-                    self.push(Entry {
-                        snapshot: Arc::new(without_frame(&entry.snapshot)),
-                        whole: false,
-                    });
+            for snapshot in snapshots {
+                keep ^= snapshot.frame.is_some();
+                if snapshot.frame.is_none() || keep {
+                    self.push(snapshot);
+                } else if snapshot.metrics.is_some() {
+                    let frame = None;
+                    self.push(Arc::new(Snapshot { frame, ..*snapshot }));
                 }
             }
-        } else if entries.len() > 1 {
-            entries.into_iter().step_by(2).for_each(|e| self.push(e));
+        } else if snapshots.len() > 1 {
+            snapshots.into_iter().step_by(2).for_each(|s| self.push(s));
         }
     }
 }
 
-fn without_frame(snapshot: &Snapshot) -> Snapshot {
-    Snapshot {
-        step: snapshot.step,
-        nanoseconds: snapshot.nanoseconds,
-        metrics: snapshot.metrics,
-        frame: None,
-        contours: false,
-        contacts: false,
-        state: false,
-        edge: false,
-    }
+/// Whether a snapshot is all that was recorded of its step: the frame of what is pictured has not been taken away.
+pub fn is_whole(snapshot: &Snapshot) -> bool {
+    snapshot.frame.is_some() || !(snapshot.contours || snapshot.contacts || snapshot.state)
 }
 
 /// Bytes that a snapshot holds, up to what an allocator adds.
 fn size(snapshot: &Snapshot) -> usize {
     let frame = snapshot.frame.as_ref();
-    size_of::<Entry>()
+    size_of::<Arc<Snapshot>>()
         + size_of::<Snapshot>()
         + frame.map_or(0, |f| {
             size_of_val(&*f.positions)
@@ -188,7 +168,7 @@ fn size(snapshot: &Snapshot) -> usize {
 mod tests {
     use super::*;
     use crate::protocol::Relaxation;
-    use crate::scene::{Channels, Scene};
+    use crate::scene::{Channels, Scene, Schedule};
 
     #[test]
     fn what_waits_is_bounded_thins_out_with_age_and_ends_with_the_newest() {
@@ -197,11 +177,17 @@ mod tests {
             ..Scene::default()
         };
         let run = Relaxation::new(&scene).expect("a run");
+        let metrics = Channels {
+            contours: Schedule::Off,
+            contacts: Schedule::Off,
+            state: Schedule::Off,
+            ..Channels::default()
+        };
         let at = |step: u64, picture: bool| {
             let snapshot = Snapshot::of(&run, &Channels::default(), true);
             let mut snapshot = snapshot.expect("a snapshot");
             if !picture {
-                snapshot = without_frame(&snapshot);
+                snapshot = Snapshot::of(&run, &metrics, false).expect("a snapshot");
             }
             Arc::new(Snapshot { step, ..snapshot })
         };
@@ -214,45 +200,48 @@ mod tests {
         }
         queue.push(at(4 * frames, true));
         assert_eq!(queue.offered(), 4 * frames + 1);
-        let left: Vec<Entry> = core::iter::from_fn(|| queue.take()).collect();
+        let left: Vec<_> = core::iter::from_fn(|| queue.take()).collect();
         assert_eq!(queue.waiting().bytes, 0);
-        let steps: Vec<u64> = left.iter().map(|e| e.snapshot.step).collect();
+        let steps: Vec<u64> = left.iter().map(|e| e.step).collect();
         assert_eq!(
             steps,
             (0..=4 * frames).collect::<Vec<_>>(),
             "no metric goes"
         );
-        let framed: Vec<_> = left.iter().filter(|e| e.snapshot.frame.is_some()).collect();
+        let framed: Vec<_> = left.iter().filter(|e| e.frame.is_some()).collect();
         let last = framed.last().expect("the newest frame");
-        assert!(last.snapshot.step == 4 * frames && last.whole);
-        assert_eq!(framed[0].snapshot.step, 0);
+        assert!(last.step == 4 * frames && is_whole(last));
+        assert_eq!(framed[0].step, 0);
         // Half of what fits is the least that is left, beside the metrics.
         let rows = (4 * frames) as usize * size(&at(0, false));
-        let bytes = framed.iter().map(|e| size(&e.snapshot)).sum::<usize>();
+        let bytes = framed.iter().map(|e| size(e)).sum::<usize>();
         assert!(
             bytes > (LIMIT - rows) / 2 - 2 * size(&at(0, true)),
             "{bytes}"
         );
         // The older, the thinner.
-        let steps: Vec<u64> = framed.iter().map(|e| e.snapshot.step).collect();
+        let steps: Vec<u64> = framed.iter().map(|e| e.step).collect();
         let gaps: Vec<u64> = steps.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(gaps.windows(2).all(|w| w[0] >= w[1]), "{gaps:?}");
-        for entry in &left {
+        for snapshot in &left {
             assert_eq!(
-                entry.whole,
-                entry.snapshot.frame.is_some() || entry.snapshot.step % 4 != 0
+                is_whole(snapshot),
+                snapshot.frame.is_some() || snapshot.step % 4 != 0
             );
         }
         // Where nothing but metrics is left, they are thinned out as well.
         let rows = 2 * LIMIT as u64 / size(&at(0, false)) as u64;
         let template = at(0, false);
         for step in 0..rows {
-            let row = without_frame(&template);
-            queue.push(Arc::new(Snapshot { step, ..row }));
+            queue.push(Arc::new(Snapshot {
+                step,
+                frame: None,
+                ..*template
+            }));
         }
         assert!(queue.waiting().bytes <= LIMIT);
         queue.skip_to_newest();
-        assert_eq!(queue.take().map(|e| e.snapshot.step), Some(rows - 1));
+        assert_eq!(queue.take().map(|e| e.step), Some(rows - 1));
         assert!(queue.take().is_none());
     }
 }

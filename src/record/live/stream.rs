@@ -1,7 +1,7 @@
 //! The thread of the live view: connects, encodes, sends, and ends in time whatever the viewer does.
 
 use super::super::{Header, Recorder as _, RrdRecorder, recording_id};
-use super::queue::{Closing, Queue};
+use super::queue::{Closing, Queue, is_whole};
 use super::{Ended, FLUSH, STARTUP, Viewer};
 use prost::Message as _;
 use re_protos::log_msg::v1alpha1 as protocol;
@@ -116,13 +116,13 @@ async fn stream(
             if closing.is_some_and(|closing| hurry(&closing, connected)) {
                 queue.skip_to_newest();
             }
-            let entry = queue.take();
-            let end = entry.is_none().then_some(closing).flatten();
+            let snapshot = queue.take();
+            let end = snapshot.is_none().then_some(closing).flatten();
             let now = Instant::now();
-            match entry {
-                Some(entry) => {
-                    recorder.record(&entry.snapshot)?;
-                    batch += u64::from(entry.whole);
+            match snapshot {
+                Some(snapshot) => {
+                    recorder.record(&snapshot)?;
+                    batch += u64::from(is_whole(&snapshot));
                     if now >= next_flush {
                         recorder.flush()?;
                         next_flush = now + PERIOD;
