@@ -110,13 +110,31 @@ impl Domain {
     #[inline(always)]
     pub(crate) fn fold(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (l_x, l_y) = (self.lengths.x, self.lengths.y);
-        let half = 0.5 * l_y;
-        let (above, below) = (y > half, y < -half);
-        // Without a tilt 0 is subtracted and added, which the fold of x does as well.
-        let x = x - pick(above, self.tilt) + pick(below, self.tilt);
-        let y = y - pick(above, l_y) + pick(below, l_y);
-        let half = 0.5 * l_x;
-        [x - pick(x > half, l_x) + pick(x < -half, l_x), y]
+        // The same for all: a loop is compiled once with a tilt and once without.
+        let x = if self.tilt == 0.0 {
+            x
+        } else {
+            less(x, y, l_y, self.tilt)
+        };
+        [nearest(x, l_x), nearest(y, l_y)]
+    }
+
+    /// [`minimum_image`](Self::minimum_image) of as many differences as the columns have: one simple loop a component, so that each
+    /// is done for several at once.
+    #[inline(always)]
+    pub(crate) fn fold_columns(&self, x: &mut [f64], y: &mut [f64]) {
+        let (l_x, l_y) = (self.lengths.x, self.lengths.y);
+        if self.tilt != 0.0 {
+            for (x, y) in x.iter_mut().zip(&*y) {
+                *x = less(*x, *y, l_y, self.tilt);
+            }
+        }
+        for x in x {
+            *x = nearest(*x, l_x);
+        }
+        for y in y {
+            *y = nearest(*y, l_y);
+        }
     }
 
     /// The vector of `columns` periods `(L_x, 0)` and `rows` periods `(tilt, L_y)`.
@@ -186,10 +204,19 @@ fn wrap_outside(x: f64, length: f64) -> f64 {
     }
 }
 
-/// `value` where `condition` holds, otherwise 0.
+/// A coordinate `d` less the period that stands beyond half of `length`.
 #[inline(always)]
-fn pick(condition: bool, value: f64) -> f64 {
-    if condition { value } else { 0.0 }
+fn nearest(d: f64, length: f64) -> f64 {
+    less(d, d, length, length)
+}
+
+/// `x` less `shift` where `d` is above half of `length`, and with it where `d` is below `−length/2`.
+#[inline(always)]
+fn less(x: f64, d: f64, length: f64, shift: f64) -> f64 {
+    let half = 0.5 * length;
+    let above = if d > half { shift } else { 0.0 };
+    let below = if d < -half { shift } else { 0.0 };
+    x - above + below
 }
 
 #[cfg(test)]

@@ -145,9 +145,9 @@ impl Four {
     fn take_nearest_images(&mut self, domain: Domain) {
         let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
         for k in 0..4 {
-            let apart = self.separation[k];
-            [x[k], y[k]] = domain.fold([apart.x, apart.y]);
+            (x[k], y[k]) = (self.separation[k].x, self.separation[k].y);
         }
+        domain.fold_columns(&mut x, &mut y);
         for k in 0..4 {
             self.distance[k] = x[k] * x[k] + y[k] * y[k];
         }

@@ -2,13 +2,13 @@
 
 use super::{Metrics, Recording};
 use crate::domain::{Domain, Vec2};
-use crate::state::coverage;
 use crate::record::{Format, Leg, Outcome};
 use crate::replay::ReadError;
 use crate::replay::source::Ending;
 use crate::replay::standing::Standing;
 use crate::replay::walk::End;
 use crate::scene::{Minimizer, Scene};
+use crate::state::coverage;
 
 impl Recording {
     /// The scene that was run.

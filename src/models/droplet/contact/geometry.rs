@@ -285,9 +285,7 @@ impl Part<'_> {
                 *overlap = radii[i] + radii[j];
             }
             // One simple loop a quantity, so that each is done several contacts at a time.
-            for (x, y) in x.iter_mut().zip(&mut *y) {
-                [*x, *y] = domain.fold([*x, *y]);
-            }
+            domain.fold_columns(x, y);
             for ((r, x), y) in distances.iter_mut().zip(&*x).zip(&*y) {
                 *r = (x * x + y * y).sqrt();
             }
