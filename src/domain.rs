@@ -148,6 +148,7 @@ impl Domain {
     }
 
     /// The box itself (no shift) and the eight around it, by the periods that lead to them.
+    #[cfg(any(feature = "recording", feature = "figure"))]
     pub(crate) fn around(&self) -> impl Iterator<Item = Vec2> + use<> {
         let domain = *self;
         [0, -1, 1]

@@ -12,6 +12,7 @@ use crate::state::Numbers;
 use fire::FireState;
 
 /// The numbers of a minimiser as they were recorded; `None` if they are those of none.
+#[cfg(feature = "recording")]
 pub(crate) fn recorded(values: &[f64]) -> Option<Numbers> {
     FireState::from_values(values).map(|state| state.numbers())
 }
@@ -22,6 +23,7 @@ pub(crate) fn dt_and_time(numbers: &Numbers) -> (f64, f64) {
 }
 
 /// What number `k` of a minimiser is.
+#[cfg(feature = "recording")]
 pub(crate) fn name_of(k: usize) -> &'static str {
     FireState::NAMES.get(k).unwrap_or(&"value")
 }

@@ -68,8 +68,6 @@ impl NewFile {
     /// # Errors
     ///
     /// [`RecordError::Exists`], [`RecordError::Busy`] if somebody else is writing it, [`RecordError::Create`].
-    ///
-    /// See the example of [`NewFile`].
     pub fn create(path: impl AsRef<Path>, replace: bool) -> Result<Self, RecordError> {
         let path = path.as_ref();
         let old = match fs::metadata(path) {
@@ -147,8 +145,6 @@ impl NewFile {
     ///
     /// Of kind [`AlreadyExists`](io::ErrorKind::AlreadyExists) if a file has come there meanwhile that is not to be replaced, or
     /// whatever the system says.
-    ///
-    /// See the example of [`NewFile`].
     pub fn publish(&self) -> io::Result<()> {
         let Some(part) = &self.part else {
             return Ok(());

@@ -20,8 +20,6 @@ pub enum Format {
 
 impl Format {
     /// The format that a file to be read is taken for by its name: MCAP if it ends in `.mcap`, else rerun's.
-    ///
-    /// See the example of [`Format`].
     #[must_use]
     pub fn of(path: impl AsRef<Path>) -> Self {
         Self::named(path).unwrap_or(Self::Rrd)
@@ -34,13 +32,6 @@ impl Format {
     ///
     /// [`RecordError::Name`] for any other name, and for one without an ending: neither the viewers nor a reader would know what is in
     /// the file.
-    ///
-    /// ```
-    /// use softjam::record::Format;
-    /// assert_eq!(Format::named("run.MCAP").unwrap(), Format::Mcap);
-    /// let error = Format::named("final.csv").unwrap_err().to_string();
-    /// assert_eq!(error, "final.csv: the name of a recording ends in .rrd (rerun) or .mcap (Foxglove)");
-    /// ```
     pub fn named(path: impl AsRef<Path>) -> Result<Self, RecordError> {
         let path = path.as_ref();
         let ends_in = |name: &str| {
@@ -58,12 +49,6 @@ impl Format {
     }
 
     /// Whether a file of this name may be written in this format: because the name says so, or since it is no regular file.
-    ///
-    /// ```
-    /// use softjam::record::Format;
-    /// assert!(Format::Mcap.suits("run.mcap"));
-    /// assert!(!Format::Mcap.suits("run.rrd"));
-    /// ```
     #[must_use]
     pub fn suits(self, path: impl AsRef<Path>) -> bool {
         let path = path.as_ref();

@@ -28,8 +28,6 @@ pub struct Leg {
 
 impl Leg {
     /// The stretch of a run of `scene` up to a step.
-    ///
-    /// See the example of [`Leg`].
     #[must_use]
     pub fn of(scene: &Scene, until: u64) -> Self {
         Self {
@@ -41,16 +39,12 @@ impl Leg {
     }
 
     /// Whether a run of `scene` has other frames.
-    ///
-    /// See the example of [`Leg`].
     #[must_use]
     pub fn changes(&self, scene: &Scene) -> bool {
         *self != Self::of(scene, self.until)
     }
 
     /// The scene of the stretch in a run that ends as one of `scene`, without its step limit.
-    ///
-    /// See the example of [`Leg`].
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         Scene {

@@ -109,8 +109,6 @@ impl<W: Write> McapRecorder<W> {
     /// # Errors
     ///
     /// Whatever `sink` fails with.
-    ///
-    /// See the example of [`McapRecorder`].
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let sink = Sink::new(sink);
         let mut writer = WriteOptions::new()

@@ -66,17 +66,9 @@ use std::io;
 use std::sync::Arc;
 
 /// The version of the recording's layout; a reader refuses newer ones.
-///
-/// ```
-/// assert_eq!(softjam::record::FORMAT_VERSION, 1);
-/// ```
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The program as it is named in recordings.
-///
-/// ```
-/// assert!(softjam::record::PROGRAM.starts_with("softjam "));
-/// ```
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
 /// The id of a recording of `scene`: the first half of the scene's BLAKE3 in hexadecimal, so that the same scene has the
@@ -127,8 +119,6 @@ pub struct Header {
 
 impl Header {
     /// The header of a recording that begins with the present step of `run`.
-    ///
-    /// See the example of [`Header`].
     #[must_use]
     pub fn of(scene: &Scene, run: &Relaxation) -> Self {
         Self {
@@ -170,18 +160,12 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with; [`intact`](Self::intact) is then the last step that it holds in full.
-    ///
-    /// See the example of [`Recorder`].
     fn record(&mut self, snapshot: &Snapshot) -> io::Result<()>;
 
     /// The last step that the sink holds in full.
-    ///
-    /// See the example of [`Recorder`].
     fn intact(&self) -> Option<u64>;
 
     /// Bytes that the sink holds and that make sense on their own: what comes behind them is a torn end.
-    ///
-    /// See the example of [`Recorder`].
     fn written(&self) -> u64;
 
     /// Writes what is left and the outcome and closes the file. Without an outcome the recording is one of an
@@ -190,8 +174,6 @@ pub trait Recorder {
     /// # Errors
     ///
     /// Whatever the sink fails with.
-    ///
-    /// See the example of [`Recorder`].
     fn finish(&mut self, outcome: Option<Outcome>) -> io::Result<Written>;
 }
 
@@ -217,12 +199,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// How `run` has ended; `None` if it goes on.
-    ///
-    /// ```
-    /// # use softjam::{record::Outcome, protocol::Relaxation, scene::Scene};
-    /// let run = Relaxation::new(&Scene { particles: 32, ..Scene::default() }).unwrap();
-    /// assert_eq!(Outcome::of(&run), None);
-    /// ```
     #[must_use]
     pub fn of(run: &Relaxation) -> Option<Self> {
         let status = run.status();

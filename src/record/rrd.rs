@@ -75,8 +75,6 @@ impl<W: Write> RrdRecorder<W> {
     /// # Errors
     ///
     /// Whatever `sink` fails with.
-    ///
-    /// See the example of [`RrdRecorder`].
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let legs = legs_to_text(&header.legs)?;
         let recording = id_of(header.scene.digest(), legs.as_deref());

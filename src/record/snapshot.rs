@@ -44,8 +44,6 @@ pub struct Snapshot {
 impl Snapshot {
     /// What `channels` ask for at the present step of `run`; `None` if that is nothing. At an `edge`, the first or the last
     /// step of a recording, every channel that is on records.
-    ///
-    /// See the example of [`Snapshot`].
     #[must_use]
     pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
         Self::made(

@@ -120,8 +120,6 @@ impl Writer {
     /// # Errors
     ///
     /// Those of [`NewFile::create`].
-    ///
-    /// See the example of [`create`](Self::create).
     pub fn create_as(
         format: Format,
         path: impl AsRef<Path>,
@@ -158,8 +156,6 @@ impl Writer {
     /// # Errors
     ///
     /// [`RecordError::Create`].
-    ///
-    /// See the example of [`start`](Self::start).
     pub fn start_conversion(
         format: Format,
         file: NewFile,

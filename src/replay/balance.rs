@@ -44,10 +44,6 @@ impl Worst {
     }
 
     /// Whether the value is within what is allowed.
-    ///
-    /// ```
-    /// assert!(softjam::replay::Worst::default().agrees());
-    /// ```
     #[must_use]
     pub fn agrees(&self) -> bool {
         self.value <= self.allowed
@@ -98,8 +94,6 @@ pub(super) const AMPLIFIED: f64 = 6.0;
 
 impl Balance {
     /// Nothing seen yet of a recording of `scene`.
-    ///
-    /// See the example of [`Balance`].
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         Self {
@@ -121,8 +115,6 @@ impl Balance {
     /// # Panics
     ///
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
-    ///
-    /// See the example of [`Balance`].
     pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
         let found = self.model.check(packing, frame, self.threshold);
@@ -151,8 +143,6 @@ impl Balance {
 
     /// Whether all frames seen fulfil the contact law to the tolerance that is due in them. With Saitoh's rule contacts lag behind their
     /// positions by a step, so only the last frame is asked for: its step must not be among the worst.
-    ///
-    /// See the example of [`Balance`].
     #[must_use]
     pub fn agrees(&self) -> bool {
         let last = self.last.map_or(0, |(step, _)| step);

@@ -135,8 +135,6 @@ impl Difference {
     /// The first difference between a recorded frame and another, `None` if all their bits agree.
     ///
     /// Compared in this order: step, positions, velocities, contacts, forces, minimiser.
-    ///
-    /// See the example of [`Difference`].
     #[must_use]
     pub fn between(recorded: &Frame, other: &Frame) -> Option<Self> {
         let step = recorded.step;

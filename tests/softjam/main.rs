@@ -25,7 +25,7 @@ mod files;
 mod forgery;
 #[cfg(feature = "recording")]
 mod hostile;
-
+mod layers;
 #[cfg(feature = "recording")]
 mod mcap;
 mod physics;

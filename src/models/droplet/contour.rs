@@ -108,11 +108,6 @@ pub struct Contours {
 
 impl Contours {
     /// An empty drawing in the given style.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contour::{ContourStyle, Contours};
-    /// assert!(Contours::new(ContourStyle::default()).is_empty());
-    /// ```
     #[must_use]
     pub fn new(style: ContourStyle) -> Self {
         let n = style.vertices;
@@ -157,8 +152,6 @@ impl Contours {
     /// # Panics
     ///
     /// If a contact names a particle that is not there, or the slices differ in length.
-    ///
-    /// See the example of [`Contours`].
     pub fn draw(
         &mut self,
         radii: &[f64],
@@ -265,22 +258,12 @@ impl Contours {
     }
 
     /// Number of polygons drawn last.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contour::{ContourStyle, Contours};
-    /// assert_eq!(Contours::new(ContourStyle::default()).len(), 0);
-    /// ```
     #[must_use]
     pub fn len(&self) -> usize {
         self.first.len() - 1
     }
 
     /// Whether nothing has been drawn.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contour::{ContourStyle, Contours};
-    /// assert!(Contours::new(ContourStyle::default()).is_empty());
-    /// ```
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -292,30 +275,18 @@ impl Contours {
     /// # Panics
     ///
     /// If there is no particle `p`.
-    ///
-    /// See the example of [`Contours`].
     #[must_use]
     pub fn polygon(&self, p: usize) -> &[Vec2] {
         &self.vertices[self.first[p]..self.first[p + 1]]
     }
 
     /// Number of vertices of all polygons.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contour::{ContourStyle, Contours};
-    /// assert_eq!(Contours::new(ContourStyle::default()).vertices(), 0);
-    /// ```
     #[must_use]
     pub fn vertices(&self) -> usize {
         self.vertices.len()
     }
 
     /// How many vertices of particles with a contact were computed so far: a count of work.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contour::{ContourStyle, Contours};
-    /// assert_eq!(Contours::new(ContourStyle::default()).evaluations(), 0);
-    /// ```
     #[must_use]
     pub fn evaluations(&self) -> u64 {
         self.evaluations

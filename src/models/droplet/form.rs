@@ -56,11 +56,6 @@ pub struct NetForces {
 
 impl NetForces {
     /// Of the given form.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::{Form, NetForces};
-    /// assert_eq!(NetForces::new(Form::Gradient).form(), Form::Gradient);
-    /// ```
     #[must_use]
     pub fn new(form: Form) -> Self {
         Self {
@@ -70,11 +65,6 @@ impl NetForces {
     }
 
     /// The form.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::{Form, NetForces};
-    /// assert_eq!(NetForces::default().form(), Form::Central);
-    /// ```
     #[must_use]
     pub fn form(&self) -> Form {
         self.form
@@ -87,8 +77,6 @@ impl NetForces {
     /// # Panics
     ///
     /// If a contact names a particle beyond the packing or `net`.
-    ///
-    /// See the example of [`NetForces`].
     pub fn evaluate(
         &mut self,
         contacts: &Contacts<'_>,
@@ -124,11 +112,6 @@ impl NetForces {
     }
 
     /// The torques `τ_c` of the contacts evaluated last (force times length); empty for the central form.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::NetForces;
-    /// assert!(NetForces::default().torques().is_empty());
-    /// ```
     #[must_use]
     pub fn torques(&self) -> &[f64] {
         &self.torques

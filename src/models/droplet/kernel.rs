@@ -21,18 +21,9 @@ pub(crate) use super::angle::{Angles, ROUND};
 use core::f64::consts::PI;
 
 /// `g(0)`: the dent under the contact itself.
-///
-/// ```
-/// assert_eq!(softjam::models::droplet::kernel::G_AT_CONTACT, softjam::models::droplet::kernel::g(0.0));
-/// ```
 pub const G_AT_CONTACT: f64 = -1.5;
 
 /// An upper bound of `g` over all angles: its maximum is 0.640 759… at ±74.77°.
-///
-/// ```
-/// use softjam::models::droplet::kernel::{g, G_MAX};
-/// assert!((0..100_000).all(|k| g(f64::from(k) * 6.283e-5) < G_MAX));
-/// ```
 pub const G_MAX: f64 = 0.640_76;
 
 /// `g(θ)` for any angle θ in radians (dimensionless).
@@ -118,11 +109,6 @@ pub struct Direction {
 
 impl Direction {
     /// The direction of a *unit* vector.
-    ///
-    /// ```
-    /// # use softjam::{domain::Vec2, models::droplet::kernel::Direction};
-    /// assert_eq!(Direction::of(Vec2::new(-1.0, 0.0)).angle, std::f64::consts::PI);
-    /// ```
     #[must_use]
     #[inline]
     pub fn of(unit: crate::domain::Vec2) -> Self {
@@ -140,12 +126,6 @@ impl Direction {
     }
 
     /// The opposite direction: how the partner sees the same contact.
-    ///
-    /// ```
-    /// # use softjam::{domain::Vec2, models::droplet::kernel::Direction};
-    /// let west = Direction::of(Vec2::new(1.0, 0.0)).opposite();
-    /// assert_eq!((west.cos, west.angle), (-1.0, std::f64::consts::PI));
-    /// ```
     #[must_use]
     #[inline(always)]
     pub fn opposite(self) -> Self {
@@ -164,13 +144,6 @@ impl Direction {
     ///
     /// The angle is a difference of two angles to the x axis, its sine and cosine come from the vectors: no `acos`, which would
     /// lose half of the digits near 0 and π.
-    ///
-    /// ```
-    /// # use softjam::{domain::Vec2, models::droplet::kernel::Direction};
-    /// let (a, b) = (Direction::of(Vec2::new(0.6, 0.8)), Direction::of(Vec2::new(-0.8, 0.6)));
-    /// assert_eq!(a.g_between(b), b.g_between(a));
-    /// assert_eq!(a.g_between(a), -1.5);
-    /// ```
     #[must_use]
     #[inline(always)]
     pub fn g_between(self, other: Self) -> f64 {
@@ -188,13 +161,6 @@ impl Direction {
     /// `g''(x) = −(π − |x|) |sin x| − (3/2) cos x`. The slope is odd: exchanging the two directions changes its sign and no
     /// other bit. It jumps from −π to π at `x = 0`, where it is given its mean, 0; two contacts of a particle never lie
     /// there.
-    ///
-    /// ```
-    /// # use softjam::{domain::Vec2, models::droplet::kernel::Direction};
-    /// let (a, b) = (Direction::of(Vec2::new(0.6, 0.8)), Direction::of(Vec2::new(-0.8, 0.6)));
-    /// assert_eq!(a.slopes_between(b).0, -b.slopes_between(a).0);
-    /// assert!((a.slopes_between(b).0 - 0.5).abs() < 1e-15, "a quarter of a turn: ½ sin π/2");
-    /// ```
     #[must_use]
     #[inline]
     pub fn slopes_between(self, other: Self) -> (f64, f64) {

@@ -24,11 +24,6 @@ use crate::contacts::Contacts;
 use crate::text::counted;
 
 /// The squeeze at which the model's own error in the force passes 10 %, for the worst of all numbers of contacts.
-///
-/// ```
-/// use softjam::models::droplet::validity::{model_error, SQUEEZE_LIMIT};
-/// assert!((model_error(SQUEEZE_LIMIT) - 0.1).abs() < 1e-4);
-/// ```
 pub const SQUEEZE_LIMIT: f64 = 0.0659;
 
 /// By what part the model's forces on a particle of the given squeeze fall short of the droplet's (dimensionless, between
@@ -86,8 +81,6 @@ impl Validity {
     /// # Panics
     ///
     /// If a contact names a particle that is not there.
-    ///
-    /// See the example of [`Validity`].
     #[must_use]
     pub fn of(contacts: &Contacts<'_>, particles: usize, line_tension: f64) -> Self {
         let mut squeeze = vec![0.0; particles];

@@ -55,8 +55,6 @@ impl Viewer {
     /// # Errors
     ///
     /// [`LiveError::Url`] for what is no address of a viewer.
-    ///
-    /// See the example of [`Viewer`].
     pub fn at(url: &str) -> Result<Self, LiveError> {
         let wrong = || LiveError::Url {
             url: url.to_owned(),
@@ -75,12 +73,6 @@ impl Viewer {
     /// # Errors
     ///
     /// [`LiveError::Missing`] or [`LiveError::Start`].
-    ///
-    /// ```no_run
-    /// use softjam::record::Viewer;
-    /// let viewer = Viewer::start(Viewer::PORT).unwrap();
-    /// assert_eq!(viewer.to_string(), Viewer::URL);
-    /// ```
     pub fn start(port: u16) -> Result<Self, LiveError> {
         let mut viewer = Self::at(&format!("rerun+http://127.0.0.1:{port}/proxy"))?;
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
@@ -214,8 +206,6 @@ impl Live {
     /// # Errors
     ///
     /// [`LiveError::Start`] if the system gives no thread.
-    ///
-    /// See the example of [`Live`].
     pub fn start(viewer: Viewer, header: Header) -> Result<Self, LiveError> {
         let queue = Arc::new(Queue::new());
         let shared = Arc::clone(&queue);
@@ -230,8 +220,6 @@ impl Live {
     }
 
     /// Shows a snapshot, some time; never waits for the viewer.
-    ///
-    /// See the example of [`Live`].
     pub fn send(&self, snapshot: impl Into<Arc<Snapshot>>) {
         if self.thread.as_ref().is_some_and(|t| !t.is_finished()) {
             self.queue.push(snapshot.into());
@@ -241,8 +229,6 @@ impl Live {
     }
 
     /// Gives the viewer two seconds to take what is left, or ten to come up if it was started for this run, and ends.
-    ///
-    /// See the example of [`Live`].
     #[must_use]
     pub fn finish(mut self, outcome: Option<Outcome>) -> Shown {
         let (ended, sent) = self.close(outcome, false);

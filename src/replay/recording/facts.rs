@@ -12,40 +12,30 @@ use crate::state::coverage;
 
 impl Recording {
     /// The scene that was run.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.header.scene
     }
 
     /// The undeformed radii `R_i`, one a particle.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn radii(&self) -> &[f64] {
         &self.header.radii
     }
 
     /// The periodic box.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn domain(&self) -> Domain {
         self.header.domain
     }
 
     /// The coverage of the undeformed disks `φ`.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn coverage(&self) -> f64 {
         coverage(&self.header.radii, self.header.domain)
     }
 
     /// The program that recorded it, as `softjam 0.1.0`.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn program(&self) -> &str {
         &self.header.program
@@ -64,8 +54,6 @@ impl Recording {
     }
 
     /// The [revision of the bits](crate::BITS) that it was recorded with.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn bits(&self) -> u32 {
         self.header.bits
@@ -76,8 +64,6 @@ impl Recording {
     /// # Errors
     ///
     /// [`ReadError::Damaged`] if its radii and box make no packing.
-    ///
-    /// See the example of [`Recording`].
     pub fn header(&self) -> Result<crate::record::Header, ReadError> {
         // Radii and box are all that a header has of a packing.
         let packing = self.packing_anywhere(vec![Vec2::zeros(); self.header.radii.len()])?;
@@ -92,61 +78,36 @@ impl Recording {
     }
 
     /// The step that the recording begins with; not 0 if its run went on from another recording.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn from_step(&self) -> u64 {
         self.header.from_step
     }
 
     /// How the run came to its first step, where not as a run of the scene would: what it went by before, in order.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn legs(&self) -> &[Leg] {
         &self.header.legs
     }
 
     /// The name of the file.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn path(&self) -> &str {
         &self.path
     }
 
     /// The format of the file.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn format(&self) -> Format {
         self.format
     }
 
     /// Whether the file was closed by its writer; if not, it breaks off. Known when the end is reached.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn is_closed(&self) -> bool {
         self.source.ending() == Some(Ending::Closed)
     }
 
     /// How the run stood at the end of the file. Known when the end is reached.
-    ///
-    /// ```
-    /// use softjam::replay::{Recording, Standing};
-    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
-    /// # let path = std::env::temp_dir().join("softjam-standing-example.rrd");
-    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
-    /// # let mut run = Relaxation::new(&scene).unwrap();
-    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-    /// # record::record(&mut run, vec![writer], &scene.channels, |run| run.step() < 9).unwrap();
-    ///
-    /// let mut recording = Recording::open(&path).unwrap();
-    /// recording.by_ref().for_each(drop);
-    /// assert_eq!(recording.standing(), Standing::Interrupted);
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
     #[must_use]
     pub fn standing(&self) -> Standing {
         let converged = self.outcome.map(|end| end.converged);
@@ -154,8 +115,6 @@ impl Recording {
     }
 
     /// The last step whose state has been read in full.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn intact(&self) -> Option<u64> {
         self.steps.last
@@ -175,16 +134,12 @@ impl Recording {
     }
 
     /// Whether the file claims to be laid out by softjam, and not by another program that rewrote it.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn is_laid_out_by_softjam(&self) -> bool {
         self.source.is_of_softjam()
     }
 
     /// How the run ended, as far as it has been read.
-    ///
-    /// See the example of [`Recording`].
     #[must_use]
     pub fn outcome(&self) -> Option<Outcome> {
         self.outcome

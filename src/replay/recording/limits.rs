@@ -22,8 +22,6 @@ impl Recording {
     ///
     /// [`ReadError::Damaged`] if the frame is not one of this recording, [`ReadError::Crowded`] if particles lie on each other as
     /// in no packing.
-    ///
-    /// See the example of [`Recording`].
     pub fn packing(&self, frame: &Frame) -> Result<Packing, ReadError> {
         self.packing_and_overlaps(frame).map(|(packing, _)| packing)
     }
@@ -54,21 +52,6 @@ impl Recording {
     /// # Errors
     ///
     /// [`ReadError::Budget`] names what takes too much and the way out.
-    ///
-    /// ```
-    /// use softjam::replay::Recording;
-    /// # use softjam::{record, protocol::Relaxation, scene::Scene};
-    /// # let path = std::env::temp_dir().join("softjam-check-run-example.rrd");
-    /// # let scene = Scene { particles: 32, phi: 0.9, ..Scene::default() };
-    /// # let mut run = Relaxation::new(&scene).unwrap();
-    /// # let writer = record::Writer::create(&path, true, record::Header::of(&scene, &run)).unwrap();
-    /// # record::record(&mut run, vec![writer], &scene.channels, |_| true).unwrap();
-    ///
-    /// let mut recording = Recording::open(&path).unwrap();
-    /// let first = recording.next_state().unwrap().unwrap();
-    /// assert!(recording.check_run(&first.frame).is_ok());
-    /// # std::fs::remove_file(&path).unwrap();
-    /// ```
     pub fn check_run(&self, frame: &Frame) -> Result<(), ReadError> {
         let (_, overlaps) = self.packing_and_overlaps(frame)?;
         let (scene, particles) = (self.scene(), self.header.radii.len());

@@ -88,14 +88,6 @@ impl Geometry {
     /// # Panics
     ///
     /// If the list is of another number of particles.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// # use softjam::models::droplet::contact::matrix::Geometry;
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// assert!(Geometry::of(&packing, &ContactList::new(1, &[]).unwrap()).distances().is_empty());
-    /// ```
     #[must_use]
     pub fn of(packing: &Packing, contacts: &ContactList) -> Self {
         let mut geometry = Self::default();
@@ -170,49 +162,24 @@ impl Geometry {
     }
 
     /// The unit vectors `n_ij = (r_i − r_j)/r_ij`; the force on `i` is `+f_ij n_ij`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::Geometry;
-    /// assert!(Geometry::default().normals().is_empty());
-    /// ```
     #[must_use]
     pub fn normals(&self) -> &[Vec2] {
         &self.normals
     }
 
     /// The centre distances `r_ij` (length).
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::Geometry;
-    /// assert!(Geometry::default().distances().is_empty());
-    /// ```
     #[must_use]
     pub fn distances(&self) -> &[f64] {
         &self.distances
     }
 
     /// The overlaps of the undeformed disks `δ_ij = R_i + R_j − r_ij` (length); negative where only bulges meet.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::Geometry;
-    /// assert!(Geometry::default().overlaps().is_empty());
-    /// ```
     #[must_use]
     pub fn overlaps(&self) -> &[f64] {
         &self.overlaps
     }
 
     /// The duplicate contact list that belongs to the contacts.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// # use softjam::models::droplet::contact::matrix::Geometry;
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let at = |x| Vec2::new(x, 2.0);
-    /// # let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5; 2], vec![at(1.0), at(1.9)]).unwrap();
-    /// let geometry = Geometry::of(&packing, &ContactList::new(2, &[[0, 1]]).unwrap());
-    /// assert_eq!(geometry.duplicate().partners(1), [0]);
-    /// ```
     #[must_use]
     pub fn duplicate(&self) -> &DuplicateContactList {
         &self.duplicate

@@ -29,14 +29,6 @@ pub struct ContactList {
 impl ContactList {
     /// The list of `pairs` among `particles` particles; `None` unless every pair has `i < j < particles` and the
     /// pairs ascend strictly.
-    ///
-    /// ```
-    /// use softjam::models::droplet::contact::list::ContactList;
-    ///
-    /// assert!(ContactList::new(4, &[[0, 3], [0, 1]]).is_none(), "out of order");
-    /// assert!(ContactList::new(4, &[[1, 1]]).is_none(), "a particle does not touch itself");
-    /// assert!(ContactList::new(4, &[[1, 4]]).is_none(), "there is no particle 4");
-    /// ```
     #[must_use]
     pub fn new(particles: usize, pairs: &[[u32; 2]]) -> Option<Self> {
         let ascending = pairs.windows(2).all(|w| w[0] < w[1]);
@@ -64,33 +56,18 @@ impl ContactList {
     }
 
     /// Number of contacts `N_c`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// assert_eq!(ContactList::new(2, &[[0, 1]]).unwrap().len(), 1);
-    /// ```
     #[must_use]
     pub fn len(&self) -> usize {
         self.partner.len()
     }
 
     /// Whether no particle touches another.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// assert!(ContactList::new(2, &[]).unwrap().is_empty());
-    /// ```
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.partner.is_empty()
     }
 
     /// Number of particles `N`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// assert_eq!(ContactList::new(2, &[]).unwrap().particles(), 2);
-    /// ```
     #[must_use]
     pub fn particles(&self) -> usize {
         self.first.len().saturating_sub(1)
@@ -101,23 +78,12 @@ impl ContactList {
     /// # Panics
     ///
     /// If there is no particle `i`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// assert_eq!(ContactList::new(3, &[[0, 2], [1, 2]]).unwrap().partners(1), [2]);
-    /// ```
     #[must_use]
     pub fn partners(&self, i: usize) -> &[u32] {
         &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
     }
 
     /// All pairs `[i, j]`, `i < j`, in the order of the list.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// let list = ContactList::new(3, &[[0, 2], [1, 2]]).unwrap();
-    /// assert_eq!(list.pairs().last(), Some([1, 2]));
-    /// ```
     pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         (0..self.particles())
             .flat_map(move |i| self.partners(i).iter().map(move |&j| [i as u32, j]))
@@ -146,12 +112,6 @@ pub struct DuplicateContactList {
 
 impl DuplicateContactList {
     /// The duplicate list of a contact list, in O(N + `N_c`).
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::{ContactList, DuplicateContactList};
-    /// let both = DuplicateContactList::of(&ContactList::new(2, &[[0, 1]]).unwrap());
-    /// assert_eq!((both.partners(0), both.partners(1)), (&[1][..], &[0][..]));
-    /// ```
     #[must_use]
     pub fn of(contacts: &ContactList) -> Self {
         let mut list = Self::default();
@@ -242,12 +202,6 @@ impl DuplicateContactList {
     /// # Panics
     ///
     /// If there is no particle `i`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::{ContactList, DuplicateContactList};
-    /// let both = DuplicateContactList::of(&ContactList::new(3, &[[0, 2], [1, 2]]).unwrap());
-    /// assert_eq!(both.partners(2), [0, 1]);
-    /// ```
     #[must_use]
     pub fn partners(&self, i: usize) -> &[u32] {
         &self.partner[self.entries(i)]
@@ -258,12 +212,6 @@ impl DuplicateContactList {
     /// # Panics
     ///
     /// If there is no particle `i`.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::{ContactList, DuplicateContactList};
-    /// let both = DuplicateContactList::of(&ContactList::new(3, &[[0, 2], [1, 2]]).unwrap());
-    /// assert_eq!(both.contacts(2), [0, 1]);
-    /// ```
     #[must_use]
     pub fn contacts(&self, i: usize) -> &[u32] {
         &self.contact[self.entries(i)]

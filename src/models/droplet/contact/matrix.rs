@@ -109,15 +109,6 @@ pub(super) struct Units {
 
 impl ContactMatrix {
     /// The matrix of `contacts`, `line_tension` being γ (force, positive).
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::list::ContactList;
-    /// # use softjam::models::droplet::contact::matrix::{ContactMatrix, Geometry};
-    /// # use softjam::{domain::{Domain, Vec2}, state::Packing};
-    /// # let packing = Packing::new(Domain::new(8.0, 8.0).unwrap(), vec![0.5], vec![Vec2::zeros()]).unwrap();
-    /// let none = ContactList::new(1, &[]).unwrap();
-    /// assert_eq!(ContactMatrix::of(&packing, &none, &Geometry::of(&packing, &none), 1.0).len(), 0);
-    /// ```
     #[must_use]
     pub fn of(
         packing: &Packing,
@@ -172,33 +163,18 @@ impl ContactMatrix {
     }
 
     /// Number of rows, the number of contacts.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// assert_eq!(ContactMatrix::default().len(), 0);
-    /// ```
     #[must_use]
     pub fn len(&self) -> usize {
         self.diagonal.len()
     }
 
     /// Whether there is no contact.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// assert!(ContactMatrix::default().is_empty());
-    /// ```
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.diagonal.is_empty()
     }
 
     /// The diagonal `A_cc`, the compliance of a contact on its own.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// assert!(ContactMatrix::default().diagonal().is_empty());
-    /// ```
     #[must_use]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
@@ -234,11 +210,6 @@ impl ContactMatrix {
     }
 
     /// Number of off-diagonal entries.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// assert_eq!(ContactMatrix::default().off_diagonals(), 0);
-    /// ```
     #[must_use]
     pub fn off_diagonals(&self) -> usize {
         2 * self
@@ -253,11 +224,6 @@ impl ContactMatrix {
     /// # Panics
     ///
     /// If `x` or `y` is shorter than the matrix.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// ContactMatrix::default().multiply(&[], &mut []);
-    /// ```
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         let n = self.len();
         let (x, y) = (&x[..n], &mut y[..n]);

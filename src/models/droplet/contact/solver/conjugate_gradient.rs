@@ -43,12 +43,6 @@ impl ConjugateGradient {
     ///
     /// [`SolverError::NotPositiveDefinite`] when a search direction has no positive curvature,
     /// [`SolverError::NotConverged`] after `100 + 10 N_c` iterations.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::matrix::ContactMatrix;
-    /// # use softjam::models::droplet::contact::solver::ConjugateGradient;
-    /// assert_eq!(ConjugateGradient::default().solve(&ContactMatrix::default(), &[], &mut [], 0.0), Ok(0));
-    /// ```
     pub fn solve(
         &mut self,
         matrix: &ContactMatrix,

@@ -125,11 +125,6 @@ pub enum LinearSolver {
 
 impl LinearSolver {
     /// A solver of the given kind.
-    ///
-    /// ```
-    /// # use softjam::models::droplet::contact::solver::{LinearSolver, Method};
-    /// assert!(matches!(LinearSolver::new(Method::GaussJordan), LinearSolver::GaussJordan(_)));
-    /// ```
     #[must_use]
     pub fn new(method: Method) -> Self {
         match method {
@@ -147,8 +142,6 @@ impl LinearSolver {
     /// # Errors
     ///
     /// [`SolverError`]. `forces` is then of no use.
-    ///
-    /// See the example of [`LinearSolver`].
     pub fn solve(
         &mut self,
         matrix: &ContactMatrix,
