@@ -42,8 +42,6 @@ impl Recording {
     }
 
     /// Whether this program gives the bits of the run that was recorded, whatever version that was.
-    ///
-    /// See the example of [`determinism`](super::determinism()).
     #[must_use]
     pub fn has_same_bits(&self) -> bool {
         // Revision 2 changed Newton's method alone.
