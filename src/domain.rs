@@ -51,6 +51,23 @@ impl Domain {
         tilt.is_finite().then_some(Self { tilt, ..self })
     }
 
+    /// `L_x`, `L_y` and the tilt, as they are recorded.
+    #[must_use]
+    pub fn values(&self) -> [f64; 3] {
+        [self.lengths.x, self.lengths.y, self.tilt]
+    }
+
+    /// The box of recorded [`values`](Self::values); `None` if there is no such box.
+    #[must_use]
+    pub fn from_values(values: &[f64]) -> Option<Self> {
+        let &[length_x, length_y, tilt] = values else {
+            return None;
+        };
+        let domain = Self::new(length_x, length_y)?.tilted(tilt)?;
+        // A tilt beyond half a side would be another lattice's name for this one.
+        (domain.tilt.to_bits() == tilt.to_bits()).then_some(domain)
+    }
+
     /// The sides `(L_x, L_y)`.
     #[must_use]
     pub fn lengths(&self) -> Vec2 {

@@ -11,10 +11,12 @@ pub(crate) use mover::{Motion, Mover};
 use crate::state::Numbers;
 use fire::FireState;
 
-/// The numbers of a minimiser as they were recorded; `None` if they are those of none.
+/// The numbers of a minimiser as they were recorded, of the first format without a name; `None` if they are those of none.
 #[cfg(feature = "recording")]
-pub(crate) fn recorded(values: &[f64]) -> Option<Numbers> {
-    FireState::from_values(values).map(|state| state.numbers())
+pub(crate) fn recorded(name: Option<&str>, values: &[f64]) -> Option<Numbers> {
+    let numbers = FireState::from_values(values)?.numbers();
+    name.is_none_or(|name| name == numbers.name())
+        .then_some(numbers)
 }
 
 /// Time step and simulated time (time) in the numbers of a minimiser.

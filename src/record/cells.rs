@@ -45,6 +45,11 @@ impl<T: Number, const W: usize> Default for Cells<T, W> {
 }
 
 impl<T: Number, const W: usize> Cells<T, W> {
+    /// Whether no row has a cell.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
     /// Adds a cell to the row at hand.
     pub fn push(&mut self, cell: [T; W]) {
         self.values.push(cell);
@@ -84,6 +89,11 @@ pub(super) struct Texts {
 }
 
 impl Texts {
+    /// Whether no row has a text.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
     /// Adds to the text at hand.
     pub fn push(&mut self, text: &str) {
         self.extend(text.as_bytes());

@@ -2,7 +2,7 @@
 
 use super::columns::array;
 use super::encode::Encoder;
-use super::{FORMAT_VERSION, Header, legend, legs_to_text};
+use super::{Header, legend, legs_to_text};
 use crate::models::Kind;
 use crate::models::droplet::validity::SQUEEZE_LIMIT;
 use crate::scene::{Scene, Start};
@@ -92,12 +92,12 @@ pub(super) fn write<W: Write>(
 }
 
 fn scene(header: &Header) -> io::Result<DynamicArchetype> {
-    let toml = header.scene.to_toml();
+    let toml = header.toml();
     let scene = DynamicArchetype::new("softjam.Scene")
         .with_component_from_data("toml", array(StringArray::from(vec![toml])))
         .with_component_from_data(
             "format_version",
-            array(UInt32Array::from(vec![FORMAT_VERSION])),
+            array(UInt32Array::from(vec![header.format])),
         )
         .with_component_from_data(
             "program",
@@ -201,7 +201,7 @@ fn text(header: &Header) -> String {
     }
     parts.push(format!(
         "\nThe whole scene:\n\n```toml\n{}```\n",
-        scene.to_toml()
+        header.toml()
     ));
     parts.concat()
 }

@@ -16,15 +16,15 @@
 //! Messages are gathered into chunks of whole steps; a chunk is compressed and has a checksum, and so has the whole file.
 
 use super::messages::{
-    ABOUT, DESCRIPTORS, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS,
-    StateMessage, topic,
+    ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage,
+    descriptors, topic,
 };
 use super::patience::Patience;
 use super::pictures::Network;
 use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
-use super::{FORMAT_VERSION, Header, Outcome, Recorder, Snapshot, Written, legs_to_text};
+use super::{Header, Outcome, Recorder, Snapshot, Written, legs_to_text};
 use crate::contacts::FrameContacts;
 use crate::models::droplet::contour::Contours;
 use crate::state::Frame;
@@ -73,6 +73,7 @@ pub struct McapRecorder<W: Write> {
     topics: Topics,
     packing: Packing,
     line_tension: f64,
+    format: u32,
     contours: Contours,
     redraw: Redraw,
     patience: Patience,
@@ -123,10 +124,10 @@ impl<W: Write> McapRecorder<W> {
             .map_err(io_error)?;
         let log_time = header.from_step.saturating_mul(STEP_NANOSECONDS);
         let about = [
-            ("format_version", FORMAT_VERSION.to_string()),
+            ("format_version", header.format.to_string()),
             ("program", header.program.clone()),
             ("bits", header.bits.to_string()),
-            ("scene_digest", hex(header.scene.digest())),
+            ("scene_digest", hex(header.digest())),
             ("from_step", header.from_step.to_string()),
         ];
         let legs = legs_to_text(&header.legs)?.map(|legs| ("legs", legs));
@@ -139,15 +140,17 @@ impl<W: Write> McapRecorder<W> {
                 create_time: 0,
                 name: SCENE.to_owned(),
                 media_type: "application/toml".to_owned(),
-                data: Cow::Owned(header.scene.to_toml().into_bytes()),
+                data: Cow::Owned(header.toml().into_bytes()),
             })
             .map_err(io_error)?;
-        let topics = Topics::open(&mut writer, &header.scene.channels).map_err(io_error)?;
+        let topics =
+            Topics::open(&mut writer, &header.scene.channels, header.format).map_err(io_error)?;
         let particles = ParticlesMessage::of(header.packing.radii(), header.packing.domain());
         let mut recorder = Self {
             writer,
             sink,
             line_tension: header.scene.line_tension,
+            format: header.format,
             contours: header.scene.model.contours(header.scene.contours),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, CHUNK_MOVES),
@@ -241,7 +244,11 @@ impl<W: Write> Recorder for McapRecorder<W> {
             let digest = frame.digest();
             self.digests.update(&digest);
             self.states += 1;
-            self.send(self.topics.state, step, &StateMessage::of(frame, &digest))?;
+            self.send(
+                self.topics.state,
+                step,
+                &StateMessage::of(frame, &digest, self.format),
+            )?;
         }
         let chunk = &mut self.chunk;
         chunk.snapshots += 1;
@@ -299,6 +306,7 @@ impl Topics {
     fn open<W: Write + io::Seek>(
         writer: &mut mcap::Writer<W>,
         channels: &crate::scene::Channels,
+        format: u32,
     ) -> Result<Self, McapError> {
         let mut open = |on: bool, topic: &str, schema: (&str, &str, &[u8])| {
             if !on {
@@ -307,7 +315,7 @@ impl Topics {
             let schema = writer.add_schema(schema.0, schema.1, schema.2)?;
             writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
         };
-        let own = |name| (name, "protobuf", DESCRIPTORS);
+        let own = |name| (name, "protobuf", descriptors(format));
         let lines = SceneUpdate::get_schema().ok_or_else(no_schema)?;
         let lines = (&*lines.name, &*lines.encoding, &*lines.data);
         let cloud = PointCloud::get_schema().ok_or_else(no_schema)?;

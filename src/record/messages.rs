@@ -5,7 +5,12 @@ use crate::domain::{Domain, Vec2};
 use crate::state::Frame;
 
 /// The schemas of the messages below: a `FileDescriptorSet`, made by `proto/regenerate`.
-pub(crate) const DESCRIPTORS: &[u8] = include_bytes!("../../proto/softjam.v1.bin");
+pub(crate) fn descriptors(format: u32) -> &'static [u8] {
+    match format {
+        1 => include_bytes!("../../proto/format-1/softjam.v1.bin"),
+        _ => include_bytes!("../../proto/softjam.v1.bin"),
+    }
+}
 
 /// `softjam.v1.Particles`.
 #[derive(Clone, PartialEq, prost::Message)]
@@ -115,10 +120,19 @@ pub(crate) struct StateMessage {
     pub minimizer: Vec<f64>,
     #[prost(bytes = "vec", tag = "7")]
     pub digest: Vec<u8>,
+    #[prost(string, tag = "8")]
+    pub solver: String,
+    #[prost(double, repeated, tag = "9")]
+    pub memory: Vec<f64>,
+    #[prost(double, repeated, tag = "10")]
+    pub r#box: Vec<f64>,
+    #[prost(uint32, tag = "11")]
+    pub stage: u32,
 }
 
 impl StateMessage {
-    pub fn of(frame: &Frame, digest: &[u8; 32]) -> Self {
+    /// As recordings of `format` have it: the first knew no names.
+    pub fn of(frame: &Frame, digest: &[u8; 32], format: u32) -> Self {
         let flat = |v: &[Vec2]| v.iter().flat_map(|p| [p.x, p.y]).collect();
         Self {
             step: frame.step,
@@ -128,6 +142,13 @@ impl StateMessage {
             force: frame.forces.clone(),
             minimizer: frame.minimizer.values().to_vec(),
             digest: digest.to_vec(),
+            solver: match format {
+                1 => String::new(),
+                _ => frame.minimizer.name().to_owned(),
+            },
+            memory: frame.memory.clone(),
+            r#box: frame.domain.map_or(Vec::new(), |d| d.values().to_vec()),
+            stage: frame.stage,
         }
     }
 }

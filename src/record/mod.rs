@@ -66,7 +66,7 @@ use std::io;
 use std::sync::Arc;
 
 /// The version of the recording's layout; a reader refuses newer ones.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// The program as it is named in recordings.
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
@@ -111,7 +111,9 @@ pub struct Header {
     pub from_step: u64,
     /// How its run came to that step, where not as a run of its scene would; empty otherwise.
     pub legs: Vec<Leg>,
-    /// The program that writes the recording, as `softjam 0.3.0`.
+    /// The version of the layout; [`FORMAT_VERSION`] but for what an older version laid out.
+    pub format: u32,
+    /// The program that writes the recording, as `softjam 0.4.0`.
     pub program: String,
     /// The [revision of the bits](crate::BITS) that its states were computed with.
     pub bits: u32,
@@ -126,9 +128,20 @@ impl Header {
             packing: run.packing().clone(),
             from_step: run.step(),
             legs: Vec::new(),
+            format: FORMAT_VERSION,
             program: PROGRAM.to_owned(),
             bits: crate::BITS,
         }
+    }
+
+    /// The scene as the recording has it.
+    pub(crate) fn toml(&self) -> String {
+        self.scene.to_toml_of(self.format)
+    }
+
+    /// BLAKE3 of [`toml`](Self::toml).
+    pub(crate) fn digest(&self) -> [u8; 32] {
+        *blake3::hash(self.toml().as_bytes()).as_bytes()
     }
 }
 

@@ -28,6 +28,7 @@ const BATCH_MOVES: u64 = 4_000_000;
 pub(super) struct Rows {
     packing: Packing,
     line_tension: f64,
+    format: u32,
     contours: Contours,
     redraw: Redraw,
     patience: Patience,
@@ -64,6 +65,7 @@ impl Rows {
     pub fn new(header: Header) -> Self {
         Self {
             line_tension: header.scene.line_tension,
+            format: header.format,
             contours: header.scene.model.contours(header.scene.contours),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, BATCH_MOVES),
@@ -139,7 +141,7 @@ impl Rows {
             self.states += 1;
             self.pending
                 .states
-                .row(snapshot.nanoseconds, frame, &digest);
+                .row(snapshot.nanoseconds, frame, &digest, self.format);
             self.pending.bytes += frame.bytes();
         }
     }

@@ -77,7 +77,7 @@ impl<W: Write> RrdRecorder<W> {
     /// Whatever `sink` fails with.
     pub fn new(sink: W, header: Header) -> io::Result<Self> {
         let legs = legs_to_text(&header.legs)?;
-        let recording = id_of(header.scene.digest(), legs.as_deref());
+        let recording = id_of(header.digest(), legs.as_deref());
         Self::start(Encoder::new(sink)?, header, &recording)
     }
 

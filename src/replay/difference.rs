@@ -169,6 +169,14 @@ fn what(a: &Frame, b: &Frame) -> Option<What> {
             let count_of = |frame: &Frame| frame.minimizer.values().len();
             count("values of the minimiser", count_of(a), count_of(b))
         })
+        .or_else(|| count("values of the memory", a.memory.len(), b.memory.len()))
+        .or_else(|| numbers(&a.memory, &b.memory, |k| format!("value {k} of the memory")))
+        .or_else(|| {
+            let values = |frame: &Frame| frame.domain.map_or([0.0; 3], |d| d.values());
+            let name = |k: usize| ["L_x", "L_y", "tilt"][k].to_owned();
+            numbers(&values(a), &values(b), name)
+        })
+        .or_else(|| count("stages before it", a.stage as usize, b.stage as usize))
 }
 
 pub(super) fn count(name: &'static str, here: usize, there: usize) -> Option<What> {

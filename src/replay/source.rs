@@ -96,6 +96,8 @@ pub(super) struct Header {
     pub scene: Scene,
     pub radii: Vec<f64>,
     pub domain: Domain,
+    /// The version of the layout.
+    pub format: u32,
     pub program: String,
     /// The revision of the bits; the first did not say so.
     pub bits: u32,

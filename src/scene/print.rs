@@ -18,6 +18,25 @@ impl Scene {
         page.text
     }
 
+    /// [`to_toml`](Self::to_toml) as recordings of a format have it: the first knew one model and did not name it.
+    #[must_use]
+    pub fn to_toml_of(&self, format: u32) -> String {
+        let mut model = Page::default();
+        self.write_model(&mut model);
+        match format {
+            1 if self.model == Kind::default() => self.to_toml().replacen(&model.text, "", 1),
+            _ => self.to_toml(),
+        }
+    }
+
+    fn write_model(&self, page: &mut Page) {
+        page.field(
+            "Model: \"morse-witten\" (droplets) or \"disks\" (undeformed, f = k delta).",
+            "model",
+            value(&self.model),
+        );
+    }
+
     fn write_packing(&self, page: &mut Page) {
         if let Start::File {
             path,
@@ -121,13 +140,7 @@ impl Scene {
             "steps",
             self.steps,
         );
-        if self.model != Kind::default() {
-            page.field(
-                "Model: \"morse-witten\" (droplets) or \"disks\" (undeformed, f = k delta).",
-                "model",
-                value(&self.model),
-            );
-        }
+        self.write_model(page);
         page.field(
             "Minimiser: \"fire\", or \"fire+newton\" (FIRE through the rearrangements, then Newton's method).",
             "minimizer",

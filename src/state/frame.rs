@@ -36,6 +36,12 @@ pub struct Frame {
     pub forces: Vec<f64>,
     /// What the minimiser carries from one move to the next.
     pub minimizer: Numbers,
+    /// The model's own numbers that the next solution depends on, beside the contact forces; most models have none.
+    pub memory: Vec<f64>,
+    /// The box, where a run changes it.
+    pub domain: Option<Domain>,
+    /// The stage of the run, counted from 0; a run of one stage has 0 throughout.
+    pub stage: u32,
 }
 
 /// The numbers of a minimiser, under its name.
@@ -148,6 +154,10 @@ impl Frame {
     /// Hashed, in little-endian bytes: `step` u64, `N` u64, the positions and then the velocities (x, y as f64 each),
     /// `N_c` u64, the contacts (i, j as u32 each), the forces (f64 each), the length of the minimiser's list u64 and its
     /// values (f64 each).
+    ///
+    /// What a frame has beyond that follows under a name of its own, and only where there is something: `solver` and the
+    /// minimiser's name unless it is `fire` or `fire+newton`, which the number of values tells apart; `memory`, its length u64
+    /// and the values (f64); `box` and `L_x`, `L_y`, tilt (f64); `stage` (u32).
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
         let minimizer = self.minimizer.values();
@@ -166,13 +176,34 @@ impl Frame {
         append(&mut buffer, self.forces.iter().map(|f| [f.to_le_bytes()]));
         buffer.extend_from_slice(&count(minimizer.len()));
         append(&mut buffer, minimizer.iter().map(|x| [x.to_le_bytes()]));
+        let name = self.minimizer.name();
+        if !["", "fire", "fire+newton"].contains(&name) {
+            buffer.extend_from_slice(b"solver");
+            buffer.extend_from_slice(name.as_bytes());
+        }
+        if !self.memory.is_empty() {
+            buffer.extend_from_slice(b"memory");
+            buffer.extend_from_slice(&count(self.memory.len()));
+            append(&mut buffer, self.memory.iter().map(|x| [x.to_le_bytes()]));
+        }
+        if let Some(domain) = self.domain {
+            buffer.extend_from_slice(b"box");
+            append(
+                &mut buffer,
+                domain.values().iter().map(|x| [x.to_le_bytes()]),
+            );
+        }
+        if self.stage > 0 {
+            buffer.extend_from_slice(b"stage");
+            buffer.extend_from_slice(&self.stage.to_le_bytes());
+        }
         *blake3::hash(&buffer).as_bytes()
     }
 
     /// The bytes of its columns.
     #[cfg(feature = "recording")]
     pub(crate) fn bytes(&self) -> usize {
-        32 * self.positions.len() + 16 * self.contacts.len()
+        32 * self.positions.len() + 16 * self.contacts.len() + 8 * self.memory.len()
     }
 
     /// Checks that the frame can belong to `particles` particles in `domain`: lengths, order of contacts, positions in
@@ -229,6 +260,8 @@ impl Frame {
             "minimiser value",
             &mut self.minimizer.values().iter().copied(),
         )?;
+        finite("value of the memory", &mut self.memory.iter().copied())?;
+        let domain = self.domain.unwrap_or(domain);
         let outside = |(_, p): &(usize, &Vec2)| !domain.contains(**p);
         if let Some((index, p)) = self.positions.iter().enumerate().find(outside) {
             let value = if (0.0..domain.lengths().x).contains(&p.x) {
@@ -272,6 +305,7 @@ mod tests {
             contacts: vec![[0, 1]],
             forces: vec![0.25],
             minimizer: Numbers::new("fire", vec![0.0; 6]),
+            ..Frame::default()
         };
         // b3sum of the bytes written down by hand from the documentation of `digest`.
         let mut bytes = vec![3, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0];

@@ -2,10 +2,10 @@
 """Checks a softjam recording with nothing of softjam's: only rerun's reader, numpy and the formulas of the paper.
 
 For every recorded state (or every K-th, with --every K):
-  eq. (4)        max |A f - delta| relative to max |delta|, A assembled densely from the positions
+  eq. (4)        max |A f - delta| relative to max |delta|, A assembled densely from the positions; of disks |f/k - delta|
   contact law    f > 0 on contacts, gap >= 0 for all other pairs
   balance        the largest net force, against the recorded f_max
-  pressure, U    from forces and distances, against the recorded metrics
+  pressure, U, Z from forces and distances, against the recorded metrics
   contours       every vertex against rho_i(theta) at its own angle
   left out       how far the latest contours and contacts are from a state that has none of its own
   beside them    periodic images of contours and contacts, undeformed disks, the numbers of particles and contacts
@@ -54,8 +54,9 @@ class Recording:
                 scene = tomllib.loads(batch["softjam.Scene:toml"][0][0].as_py())
                 self.line_tension = scene["line_tension"]
                 self.gradient = scene.get("forces", "central") == "gradient"
-                self.threshold, self.tolerance = scene["threshold"], scene["contact_tolerance"]
-                self.seed_rule = scene["contact_rule"] in ("saitoh", "seed")
+                self.disks = scene.get("model", "morse-witten") == "disks"
+                self.threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
+                self.seed_rule = scene.get("contact_rule") in ("saitoh", "seed")
                 self.channels = scene["channels"]
             if entity in BESIDE and not chunk.is_static:
                 columns = [batch[name] for name in BESIDE[entity]]
@@ -105,10 +106,14 @@ def check_state(recording, state, gamma):
     angle_i = np.arctan2(-normal[:, 1], -normal[:, 0])
     angle_j = np.arctan2(normal[:, 1], normal[:, 0])
     around = [[] for _ in range(n)]
-    for c in range(len(forces)):
-        around[i[c]].append((angle_i[c], c))
-        around[j[c]].append((angle_j[c], c))
     matrix = np.zeros((len(forces), len(forces)))
+    if recording.disks:
+        # f = k delta with k = 4 pi gamma / 3 (R_i + R_j), and nothing bulges.
+        np.fill_diagonal(matrix, 3 * (radii[i] + radii[j]) / (4 * np.pi * gamma))
+    else:
+        for c in range(len(forces)):
+            around[i[c]].append((angle_i[c], c))
+            around[j[c]].append((angle_j[c], c))
     for p in range(n):
         for a, c in around[p]:
             for b, k in around[p]:
@@ -152,6 +157,7 @@ def check_state(recording, state, gamma):
         "f_max": np.hypot(net[:, 0], net[:, 1]).max(),
         "pressure": (forces * r).sum() / (2 * box.prod()),
         "energy": 0.5 * (forces * delta).sum(),
+        "coordination": coordination(n, contacts),
         "around": around,
         "scale": scale,
     }
@@ -160,6 +166,8 @@ def check_state(recording, state, gamma):
 def promised(recording, f_max, scale):
     """The residual that a frame keeps to, relative to max |delta|: 16 tolerances; looser far from balance, f_max in units of gamma."""
     tolerance = recording.tolerance
+    if recording.disks:
+        return 1e-9
     if f_max > recording.threshold and not recording.seed_rule and scale > 0:
         tolerance = max(tolerance, min(3e-4, 1e-2 * f_max * 1.5 / np.pi * recording.radii.min() / scale))
     return max(16 * tolerance, 1e-9)
@@ -223,6 +231,12 @@ def rattles(n, contacts):
         if not loose.any():
             return ~alive
         alive &= ~loose
+
+
+def coordination(n, contacts):
+    """Z of the particles that are held, by the contacts among them."""
+    held = ~rattles(n, contacts)
+    return 2 * held[contacts].all(axis=1).sum() / held.sum() if held.any() else 0.0
 
 
 def check_beside(recording, step, state, around, gamma, single):
@@ -308,7 +322,7 @@ def main():
     gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
-    checks = ("eq4", "gap", "force", "f_max", "pressure", "energy", "contour", "beside", "left out")
+    checks = ("eq4", "gap", "force", "f_max", "pressure", "energy", "coordination", "contour", "beside", "left out")
     worst = dict.fromkeys(checks, 0.0)
     vertices, count, latest = 0, 0, 0
     # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
@@ -323,6 +337,8 @@ def main():
         for name in ("f_max", "pressure", "energy"):
             recorded = recording.metrics[name][step]
             worst[name] = max(worst[name], abs(found[name] / gamma - recorded))
+        recorded = recording.metrics["coordination"][step]
+        worst["coordination"] = max(worst["coordination"], abs(found["coordination"] - recorded))
         if step in recording.contours:
             strips = recording.contours[step]
             vertices += sum(len(s) for s in strips)
@@ -339,6 +355,7 @@ def main():
         "f_max": (1e-9, "net force against the recorded f_max"),
         "pressure": (1e-9, "pressure against the recorded one"),
         "energy": (1e-9, "energy against the recorded one"),
+        "coordination": (1e-12, "Z against the recorded one"),
         "contour": (single, f"contour vertex off rho(theta), {vertices} vertices"),
         "beside": (2e-7, f"numbers of particles and contacts, beside {count} periodic images"),
         "left out": (1 + 1e-9, f"the latest picture over what redraw allows, {latest} states without contours of their own"),

@@ -24,6 +24,8 @@ mod files;
 #[cfg(feature = "recording")]
 mod forgery;
 #[cfg(feature = "recording")]
+mod formats;
+#[cfg(feature = "recording")]
 mod hostile;
 mod layers;
 #[cfg(feature = "recording")]

@@ -355,10 +355,10 @@ fn a_newer_format_is_refused_by_its_number() {
         },
         |_| {},
     );
-    // The version is a u32 1 in a padded buffer of its own in the header; find it by trying.
+    // The version is a u32 2 in a padded buffer of its own in the header; find it by trying.
     let mut versions = Vec::new();
     for place in (0..bytes.len().min(200_000) - 64).step_by(4) {
-        if bytes[place..place + 4] == [1, 0, 0, 0]
+        if bytes[place..place + 4] == [2, 0, 0, 0]
             && bytes[place + 4..place + 60].iter().all(|b| *b == 0)
         {
             let mut newer = bytes.clone();
@@ -372,7 +372,7 @@ fn a_newer_format_is_refused_by_its_number() {
     assert!(
         versions
             .iter()
-            .all(|v| v.contains("format version 7, this program reads up to 1"))
+            .all(|v| v.contains("format version 7, this program reads up to 2"))
     );
 }
 
@@ -410,6 +410,7 @@ fn golden_recordings_verify() {
         ("hexagonal.rrd", true, true),
         ("state-only.rrd", true, true),
         ("step-limit.rrd", true, false),
+        ("disks.rrd", true, true),
         ("killed.rrd", false, false),
     ];
     let mut size = 0;

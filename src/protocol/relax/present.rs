@@ -27,6 +27,9 @@ impl Relaxation {
         let (pairs, forces) = (&mut frame.contacts, &mut frame.forces);
         self.model.copy_contacts(&self.packing, pairs, forces);
         frame.minimizer = self.mover.numbers();
+        // No model and no protocol of today has more.
+        frame.memory.clear();
+        (frame.domain, frame.stage) = (None, 0);
     }
 
     /// The packing as it stands.

@@ -60,6 +60,7 @@ impl Topics {
 /// What the metadata record says of the file.
 #[derive(Clone)]
 struct About {
+    format: u32,
     program: String,
     scene_digest: String,
     bits: u32,
@@ -108,6 +109,7 @@ impl McapSource {
                     scene: checked_scene(path, about, toml)?,
                     radii: radii.clone(),
                     domain: *domain,
+                    format: about.format,
                     program: about.program.clone(),
                     bits: about.bits,
                     from_step: about.from_step,
@@ -171,14 +173,15 @@ impl McapSource {
 
 fn read_about(path: &str, metadata: &BTreeMap<String, String>) -> Result<Option<About>, ReadError> {
     let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
-    let Ok(version) = text("format_version").parse() else {
+    let Ok(format) = text("format_version").parse() else {
         return Ok(None);
     };
-    check_version(path, version)?;
+    check_version(path, format)?;
     let from_step = text("from_step").parse().unwrap_or(0);
     let legs = metadata.get("legs");
     let legs = legs.map_or(Ok(Vec::new()), |legs| legs_from_text(legs, from_step));
     Ok(Some(About {
+        format,
         program: shown(&text("program")),
         scene_digest: text("scene_digest"),
         bits: text("bits").parse().unwrap_or(1),
@@ -272,7 +275,12 @@ fn read_state(bytes: &[u8]) -> Result<Item, String> {
     if !rest.is_empty() {
         return Err("a contact has no j".to_owned());
     }
-    let minimizer = recorded(&message.minimizer);
+    let name = Some(message.solver.as_str()).filter(|name| !name.is_empty());
+    let minimizer = recorded(name, &message.minimizer);
+    let domain = match &*message.r#box {
+        [] => None,
+        values => Some(Domain::from_values(values).ok_or("its box is none")?),
+    };
     let frame = Frame {
         step: message.step,
         positions: vectors(message.position, "position")?,
@@ -280,6 +288,9 @@ fn read_state(bytes: &[u8]) -> Result<Item, String> {
         contacts: contacts.to_vec(),
         forces: message.force,
         minimizer: minimizer.ok_or("no minimiser state")?,
+        memory: message.memory,
+        domain,
+        stage: message.stage,
     };
     Ok(Item::State(frame, message.digest))
 }

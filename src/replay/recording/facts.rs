@@ -51,6 +51,12 @@ impl Recording {
         self.header.bits == crate::BITS || unchanged
     }
 
+    /// The version of the layout.
+    #[must_use]
+    pub fn format_version(&self) -> u32 {
+        self.header.format
+    }
+
     /// The [revision of the bits](crate::BITS) that it was recorded with.
     #[must_use]
     pub fn bits(&self) -> u32 {
@@ -70,6 +76,7 @@ impl Recording {
             packing,
             from_step: self.header.from_step,
             legs: self.header.legs.clone(),
+            format: self.header.format,
             program: self.header.program.clone(),
             bits: self.header.bits,
         })

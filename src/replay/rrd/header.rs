@@ -16,6 +16,7 @@ struct About {
     scene: Scene,
     /// The recording's id, as its scene makes it.
     id: String,
+    format: u32,
     program: String,
     bits: u32,
     from_step: u64,
@@ -102,6 +103,7 @@ pub(super) fn read(
             scene: about.scene,
             radii,
             domain,
+            format: about.format,
             program: about.program,
             bits: about.bits,
             from_step: about.from_step,
@@ -145,9 +147,9 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
             .and_then(|list| list.first().map(ToString::to_string))
     };
     let mut versions = chunk.iter_slices::<u32>("softjam.Scene:format_version".into());
-    if let Some(&[found]) = versions.next() {
-        check_version(path, found)?;
-    }
+    let format = versions.next().and_then(|list| list.first().copied());
+    let format = format.unwrap_or(1);
+    check_version(path, format)?;
     let Some(toml) = text("softjam.Scene:toml") else {
         return Ok(None);
     };
@@ -160,6 +162,7 @@ fn read_about(path: &str, chunk: &Chunk) -> Result<Option<About>, ReadError> {
     Ok(Some(About {
         scene,
         id: id_of(digest, legs.as_deref()),
+        format,
         program: shown(&text("softjam.Scene:program").unwrap_or_default()),
         bits: bits.next().and_then(|l| l.first().copied()).unwrap_or(1),
         from_step,

@@ -8,7 +8,7 @@ use super::source::{Ending, Header, Item, Problem, Source, guarded};
 use crate::analysis::METRICS;
 use crate::analysis::Stability;
 use crate::budget::Budget;
-use crate::domain::Vec2;
+use crate::domain::{Domain, Vec2};
 use crate::minimize::recorded;
 use crate::record::Outcome;
 use crate::state::Frame;
@@ -205,11 +205,21 @@ fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
     let mut digests = chunk
         .iter_slices::<u8>("softjam.State:digest".into())
         .map(<[u8]>::to_vec);
+    let mut solvers = chunk.iter_slices::<String>("softjam.State:solver".into());
+    let mut memories = numbers("softjam.State:memory").into_iter();
+    let mut boxes = numbers("softjam.State:box").into_iter();
+    let mut stages = chunk.iter_slices::<u32>("softjam.State:stage".into());
     for step in steps(chunk) {
         let missing = |what| format!("no {what} at step {step}");
+        let name = solvers.next();
+        let name = name.and_then(|names| names.first().map(ToString::to_string));
+        let domain = match &*boxes.next().unwrap_or_default() {
+            [] => None,
+            values => Some(Domain::from_values(values).ok_or_else(|| missing("such box"))?),
+        };
         let minimizer = minimizers
             .next()
-            .and_then(|values| recorded(&values))
+            .and_then(|values| recorded(name.as_deref(), &values))
             .ok_or_else(|| missing("minimiser state"))?;
         let frame = Frame {
             step,
@@ -218,6 +228,12 @@ fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
             contacts: contacts.next().ok_or_else(|| missing("contacts"))?,
             forces: forces.next().ok_or_else(|| missing("forces"))?,
             minimizer,
+            memory: memories.next().unwrap_or_default(),
+            domain,
+            stage: stages
+                .next()
+                .and_then(|list| list.first().copied())
+                .unwrap_or(0),
         };
         let digest = digests.next().ok_or_else(|| missing("digest"))?;
         items.push(Item::State(frame, digest));
