@@ -10,6 +10,10 @@
     clippy::print_stdout,
     reason = "a program that prints what it measured"
 )]
+#![expect(
+    clippy::unwrap_used,
+    reason = "every run of it is one of droplets, which have a contact law"
+)]
 
 use softjam::analysis::Backbone;
 use softjam::models::disks::DiskParameters;

@@ -8,6 +8,7 @@
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use softjam::domain::Domain;
+use softjam::models::Model;
 use softjam::models::droplet::Form;
 use softjam::models::droplet::contour::{ContourStyle, Contours};
 use softjam::protocol::{Relaxation, Status};
@@ -72,7 +73,7 @@ fn picture(run: &Relaxation) -> String {
         packing.radii(),
         packing.positions(),
         &run.contacts(),
-        run.law().unwrap().line_tension(),
+        run.model().line_tension(),
     );
     let l = packing.domain().lengths() * pixels;
     let mut svg = format!(

@@ -174,7 +174,7 @@ pub enum AnyModel {
     /// Droplets.
     MorseWitten(Box<MorseWitten>),
     /// Undeformed disks.
-    Disks(Disks),
+    Disks(Box<Disks>),
 }
 
 macro_rules! each {

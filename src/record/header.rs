@@ -180,15 +180,20 @@ fn text(header: &Header) -> String {
         parts.push("| in the picture | |\n| --- | --- |\n".to_owned());
     }
     if channels.contours.is_on() {
-        let outline = match scene.model {
-            Kind::MorseWitten => "contour ρ(θ) of a particle",
-            Kind::Disks => "edge of a disk",
+        let [outline, dent, disks] = match scene.model {
+            Kind::MorseWitten => [
+                "contour ρ(θ) of a particle",
+                ", deepest dent −ΔR/R",
+                "| `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n",
+            ],
+            Kind::Disks => ["edge of a disk", "", ""],
         };
-        parts.push(format!("| outline | {outline}; thin and dim: periodic image of one that crosses the edge |\n\
+        parts.push(format!(
+            "| outline | {outline}; thin and dim: periodic image of one that crosses the edge |\n\
              | its colour | pressure on the particle, p = Σ f / 2πR, over the mean (viridis, 0 to 2) |\n\
              | gray | rattler: fewer than three contacts that bear a force |\n\
-             | what fills it | hover it for its number, p (γ/length), number of contacts Z, deepest dent −ΔR/R |\n\
-             | `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n"));
+             | what fills it | hover it for its number, p (γ/length), number of contacts Z{dent} |\n{disks}"
+        ));
     }
     if channels.contacts.is_on() {
         parts.push("| line | contact; width and colour: force f over the mean (inferno, 0 to 3); click it for its pair, f (γ) and overlap δ |\n".to_owned());

@@ -398,7 +398,7 @@ impl Scene {
     #[must_use]
     pub fn model(&self) -> AnyModel {
         match self.model {
-            Kind::Disks => AnyModel::Disks(Disks::new(self.line_tension)),
+            Kind::Disks => AnyModel::Disks(Box::new(Disks::new(self.line_tension))),
             Kind::MorseWitten => {
                 AnyModel::MorseWitten(Box::new(MorseWitten::new(self.contact_law(), self.forces)))
             }
