@@ -8,6 +8,7 @@ use softjam::models::Kind;
 use softjam::record::Writer;
 use softjam::replay::{Balance, Bytes, Recording, Way, determinism};
 use softjam::scene::{Channels, Scene, Schedule};
+use softjam::state::Frame;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -66,7 +67,7 @@ fn recordings_of_the_first_format_are_converted_to_each_other_and_have_the_state
     ] {
         let [first, second] = ["format-1", ""].map(|folder| {
             let bytes = fs::read(golden(folder).join(name)).expect(name);
-            let digests: Vec<_> = states(&bytes).iter().map(|f| f.digest()).collect();
+            let digests: Vec<_> = states(&bytes).iter().map(Frame::digest).collect();
             digests
         });
         assert_eq!(first, second, "{name}");
@@ -103,7 +104,7 @@ fn memory_box_and_stage_of_a_frame_come_back_from_either_format() {
         assert_eq!(found.len(), 4);
         // Each of them is in the digest.
         let plain = found[2].digest();
-        let changed = |change: &dyn Fn(&mut softjam::state::Frame)| {
+        let changed = |change: &dyn Fn(&mut Frame)| {
             let mut frame = found[2].clone();
             change(&mut frame);
             frame.digest()

@@ -74,7 +74,7 @@ fn a_run_finished_by_newton_with_either_form_of_forces_is_verified() {
         let bytes = record(&scene, |_| {});
         let frames = states(&bytes);
         let last = frames.last().expect("a state");
-        assert!(fire(&last).turns.moves > 0, "{forces:?}");
+        assert!(fire(last).turns.moves > 0, "{forces:?}");
         for way in WAYS {
             let verdict = replay(&bytes, way).expect("a verdict");
             assert_eq!(verdict.difference, None, "{forces:?}, {way:?}");
