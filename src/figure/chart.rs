@@ -1,11 +1,11 @@
 //! Curves over linear or logarithmic axes, in a frame with marks and without a grid.
 
 use super::axis::{Axis, Ruler};
-use super::shades::hundredths;
-use super::{FONTS, FigureError, INK, font_size, with_f_max};
-use std::collections::BTreeMap;
-use svg::node::element::{Circle, Group, Line, Polyline, Rectangle, Text};
-use svg::{Document, Node as _};
+use super::keys::{self, COLORS, Key, keys, legend};
+use super::shapes::{CHARACTER, frame, hundredths, line, page, paper, rectangle, text};
+use super::{FigureError, INK, font_size, with_f_max};
+use svg::Node as _;
+use svg::node::element::{Group, Polyline, Text};
 
 /// How a [`Curve`] is drawn.
 ///
@@ -36,11 +36,6 @@ pub struct Curve {
     pub mark: Mark,
 }
 
-/// The colours of M. Okabe and K. Ito (2008), which the colour-blind can tell apart.
-const COLORS: [&str; 6] = [
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
-];
-
 /// How many curves of a [`chart`] have a colour of their own; from there on colours come again, with dashes.
 ///
 /// ```
@@ -58,9 +53,6 @@ const COLORS: [&str; 6] = [
 /// ```
 pub const CURVE_COLORS: usize = COLORS.len();
 
-/// The colour of what is dashed.
-const GREY: &str = "#3c3c3c";
-
 /// The width of a chart (pixels of the SVG, 96 an inch), where no other is asked for.
 pub const CHART_WIDTH: f64 = 720.0;
 
@@ -69,9 +61,6 @@ const SHAPE: f64 = 0.64;
 
 /// Points of a curve beyond this number add bytes and nothing to the picture.
 const POINTS: usize = 4000;
-
-/// Width of a character (font sizes), a little more than the mean of the typeface.
-const CHARACTER: f64 = 0.58;
 
 /// Draws curves as SVG.
 ///
@@ -130,104 +119,23 @@ pub fn chart_in(width: f64, x: &Axis, y: &Axis, curves: &[Curve]) -> Result<Stri
     let (width, height) = (hundredths(width), hundredths(SHAPE * width));
     let font = font_size(width);
     let keys = keys(curves);
+    let room = keys::size(&keys, font);
     let mut sheet = Sheet::of((width, height), font, across, up);
-    let corner = sheet.free_corner(curves, &keys);
+    let corner = sheet.free_corner(curves, room);
     if corner.is_none() {
-        sheet.right -= key_size(&keys, font).0 + 0.8 * font;
+        sheet.right -= room.0 + 0.8 * font;
     }
-    let svg = Document::new()
-        .set("viewBox", (0, 0, width, height))
-        .set("width", width)
-        .set("height", height)
-        .set("font-family", FONTS)
+    // Where no corner is free the legend lies beside the frame.
+    let corner = corner.unwrap_or((sheet.right + 0.9 * font, sheet.top));
+    let svg = page((width, height))
         .set("font-size", hundredths(font))
         .set("fill", INK)
-        .add(
-            Rectangle::new()
-                .set("width", "100%")
-                .set("height", "100%")
-                .set("fill", "white"),
-        )
+        .add(paper())
         .add(sheet.axes((&x.title, &y.title), (width, height)))
         .add(sheet.curves(curves, &keys))
-        .add(legend(&keys, font, sheet.legend_at(corner, &keys)))
+        .add(legend(&keys, font, corner))
         .to_string();
     Ok(with_f_max(&svg, 1.1 * font))
-}
-
-/// A line of the legend, and how curves of that name are drawn.
-struct Key {
-    label: String,
-    color: &'static str,
-    mark: Mark,
-    /// Dash and gap (font sizes), where the line is not drawn through.
-    dash: Option<[f64; 2]>,
-}
-
-/// Of thresholds and theories.
-const DASHES: [f64; 2] = [0.4, 0.3];
-
-/// Of curves whose color another has already.
-const LONG_DASHES: [f64; 2] = [0.9, 0.2];
-
-/// A key for each name, in the order in which they come.
-fn keys(curves: &[Curve]) -> Vec<Key> {
-    let mut keys: Vec<Key> = Vec::new();
-    for curve in curves {
-        if keys.iter().any(|key| key.label == curve.label) {
-            continue;
-        }
-        let colored = keys.iter().filter(|key| key.color != GREY).count();
-        let (color, dash) = match curve.mark {
-            Mark::Dashes => (GREY, Some(DASHES)),
-            Mark::Line | Mark::Dots => (
-                COLORS[colored % COLORS.len()],
-                (colored >= COLORS.len()).then_some(LONG_DASHES),
-            ),
-        };
-        keys.push(Key {
-            label: curve.label.clone(),
-            color,
-            mark: curve.mark,
-            dash,
-        });
-    }
-    keys
-}
-
-/// Width and height of a legend.
-fn key_size(keys: &[Key], font: f64) -> (f64, f64) {
-    let longest = keys.iter().map(|key| key.label.chars().count()).max();
-    let text = CHARACTER * font * longest.unwrap_or(0) as f64;
-    (text + 2.6 * font, 1.45 * font * keys.len() as f64)
-}
-
-/// The legend with its upper left corner there.
-fn legend(keys: &[Key], font: f64, (left, top): (f64, f64)) -> Group {
-    let mut group = Group::new();
-    for (k, key) in keys
-        .iter()
-        .enumerate()
-        .filter(|(_, key)| !key.label.is_empty())
-    {
-        let y = top + 1.45 * font * (k as f64 + 0.5);
-        match key.mark {
-            Mark::Dots => group.append(dot((left + font, y), key.color, font)),
-            Mark::Line | Mark::Dashes => {
-                let line = segment([(left, y), (left + 2.0 * font, y)], key.color, 1.8);
-                group.append(match dashes(key, font) {
-                    Some(dashes) => line.set("stroke-dasharray", dashes),
-                    None => line,
-                });
-            }
-        }
-        group.append(text(
-            &key.label,
-            (left + 2.6 * font, y + 0.36 * font),
-            "start",
-        ));
-    }
-    group
 }
 
 /// The frame that curves are drawn in.
@@ -272,96 +180,71 @@ impl Sheet {
     /// Frame, marks on all four sides, numbers and titles.
     fn axes(&self, (x_title, y_title): (&str, &str), (width, height): (f64, f64)) -> Group {
         let (font, long, short) = (self.font, 0.45 * self.font, 0.25 * self.font);
-        let mut group = Group::new().add(
-            Rectangle::new()
-                .set("x", hundredths(self.left))
-                .set("y", hundredths(self.top))
-                .set("width", hundredths(self.right - self.left))
-                .set("height", hundredths(self.bottom - self.top))
-                .set("fill", "none")
-                .set("stroke", INK)
-                .set("stroke-width", 1),
-        );
-        let mut mark =
-            |from: (f64, f64), to: (f64, f64)| group.append(segment([from, to], INK, 0.8));
-        let marks = |ruler: &Ruler| -> Vec<(f64, f64)> {
+        let (left, right, top, bottom) = (self.left, self.right, self.top, self.bottom);
+        let inside = rectangle((left, top), (right - left, bottom - top));
+        let mut group = Group::new().add(frame(inside, 1.0));
+        let mut mark = |from, to| group.append(line([from, to], 0.8).set("stroke", INK));
+        let marks = |ruler: &Ruler| {
             let labels = ruler.labels().into_iter().map(|(at, _)| (at, long));
-            labels
-                .chain(ruler.minor().into_iter().map(|at| (at, short)))
-                .collect()
+            labels.chain(ruler.minor().into_iter().map(|at| (at, short)))
         };
-        for (at, length) in marks(&self.across) {
-            let x = self.x(at);
-            mark((x, self.bottom), (x, self.bottom - length));
-            mark((x, self.top), (x, self.top + length));
+        for (x, length) in marks(&self.across).map(|(at, length)| (self.x(at), length)) {
+            mark((x, bottom), (x, bottom - length));
+            mark((x, top), (x, top + length));
         }
-        for (at, length) in marks(&self.up) {
-            let y = self.y(at);
-            mark((self.left, y), (self.left + length, y));
-            mark((self.right, y), (self.right - length, y));
+        for (y, length) in marks(&self.up).map(|(at, length)| (self.y(at), length)) {
+            mark((left, y), (left + length, y));
+            mark((right, y), (right - length, y));
         }
         for (at, label) in self.across.labels() {
-            group.append(text(
-                &label,
-                (self.x(at), self.bottom + 1.3 * font),
-                "middle",
-            ));
+            let place = (self.x(at), bottom + 1.3 * font);
+            group.append(text(&label, place, "middle"));
         }
         for (at, label) in self.up.labels() {
-            let place = (self.left - 0.5 * font, self.y(at) + 0.36 * font);
+            let place = (left - 0.5 * font, self.y(at) + 0.36 * font);
             group.append(text(&label, place, "end"));
         }
-        let middle = (0.5 * (self.left + self.right)).min(width);
-        let title = text(x_title, (middle, height - 0.8 * font), "middle");
-        group.append(title.set("font-size", hundredths(1.1 * font)));
-        let at = (1.4 * font, 0.5 * (self.top + self.bottom));
-        let turned = format!(
-            "translate({} {}) rotate(-90)",
-            hundredths(at.0),
-            hundredths(at.1)
-        );
+        let size = hundredths(1.1 * font);
+        let at = ((0.5 * (left + right)).min(width), height - 0.8 * font);
+        group.append(text(x_title, at, "middle").set("font-size", size));
+        let (x, y) = (hundredths(1.4 * font), hundredths(0.5 * (top + bottom)));
         group.append(
             Text::new(y_title)
-                .set("transform", turned)
+                .set("transform", format!("translate({x} {y}) rotate(-90)"))
                 .set("text-anchor", "middle")
-                .set("font-size", hundredths(1.1 * font)),
+                .set("font-size", size),
         );
         group
     }
 
     fn curves(&self, curves: &[Curve], keys: &[Key]) -> Group {
         let mut group = Group::new();
-        let keys: BTreeMap<&str, &Key> = keys.iter().map(|k| (k.label.as_str(), k)).collect();
         for curve in curves {
-            let Some(key) = keys.get(curve.label.as_str()) else {
+            let Some(key) = keys.iter().find(|key| key.label == curve.label) else {
                 continue;
             };
             for (&(x, y), error) in curve.points.iter().zip(&curve.errors) {
                 let ends = [self.place((x, y - error)), self.place((x, y + error))];
                 if let [Some(a), Some(b)] = ends {
-                    group.append(segment([a, b], key.color, 1.5));
+                    group.append(line([a, b], 1.5).set("stroke", key.color));
                 }
             }
             let points = self.points(curve);
             if curve.mark == Mark::Dots {
                 for point in points {
-                    group.append(dot(point, key.color, self.font));
+                    group.append(key.dot(point, self.font));
                 }
                 continue;
             }
-            let points = points
-                .iter()
-                .map(|(x, y)| format!("{},{}", hundredths(*x), hundredths(*y)));
-            let line = Polyline::new()
-                .set("points", points.collect::<Vec<_>>().join(" "))
+            let place = |&(x, y): &(f64, f64)| format!("{},{}", hundredths(x), hundredths(y));
+            let points: Vec<String> = points.iter().map(place).collect();
+            let mut curve = Polyline::new()
+                .set("points", points.join(" "))
                 .set("fill", "none")
-                .set("stroke", key.color)
                 .set("stroke-width", 1.4)
                 .set("stroke-linejoin", "round");
-            group.append(match dashes(key, self.font) {
-                Some(dashes) => line.set("stroke-dasharray", dashes),
-                None => line,
-            });
+            key.paint(&mut curve, self.font);
+            group.append(curve);
         }
         group
     }
@@ -374,13 +257,13 @@ impl Sheet {
         shown.filter_map(|k| self.place(curve.points[k])).collect()
     }
 
-    /// The corner in which a legend lies on no curve.
-    fn free_corner(&self, curves: &[Curve], keys: &[Key]) -> Option<Corner> {
-        let (width, height) = key_size(keys, self.font);
+    /// Where a legend of this size lies in a corner of the frame and on no curve: its upper left corner.
+    fn free_corner(&self, curves: &[Curve], (width, height): (f64, f64)) -> Option<(f64, f64)> {
+        let (air, around) = (0.9 * self.font, 0.4 * self.font);
+        let (left, right) = (self.left + air, self.right - air - width);
+        let (top, bottom) = (self.top + air, self.bottom - air - height);
         let lines: Vec<Vec<(f64, f64)>> = curves.iter().map(|curve| self.points(curve)).collect();
-        Corner::ALL.into_iter().find(|corner| {
-            let (left, top) = self.corner(*corner, (width, height));
-            let around = 0.4 * self.font;
+        let is_free = |&(left, top): &(f64, f64)| {
             let within = |(x, y): (f64, f64)| {
                 x > left - around
                     && x < left + width + around
@@ -388,51 +271,9 @@ impl Sheet {
                     && y < top + height + around
             };
             !lines.iter().any(|line| trodden(line).any(within))
-        })
-    }
-
-    /// Where the upper left corner of something of this size is in a corner of the frame.
-    fn corner(&self, corner: Corner, (width, height): (f64, f64)) -> (f64, f64) {
-        let air = 0.9 * self.font;
-        let x = if corner.right {
-            self.right - air - width
-        } else {
-            self.left + air
         };
-        let y = if corner.top {
-            self.top + air
-        } else {
-            self.bottom - air - height
-        };
-        (x, y)
-    }
-
-    /// Where the legend lies: in its corner, or beside the frame.
-    fn legend_at(&self, corner: Option<Corner>, keys: &[Key]) -> (f64, f64) {
-        match corner {
-            Some(corner) => self.corner(corner, key_size(keys, self.font)),
-            None => (self.right + 0.9 * self.font, self.top),
-        }
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Corner {
-    right: bool,
-    top: bool,
-}
-
-impl Corner {
-    /// The first of those that are free is taken.
-    const ALL: [Self; 4] = [
-        Self::of(true, true),
-        Self::of(false, true),
-        Self::of(true, false),
-        Self::of(false, false),
-    ];
-
-    const fn of(right: bool, top: bool) -> Self {
-        Self { right, top }
+        let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
+        corners.into_iter().find(is_free)
     }
 }
 
@@ -448,41 +289,6 @@ fn trodden(line: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
         })
     });
     line.iter().copied().chain(pairs)
-}
-
-fn text(words: &str, (x, y): (f64, f64), anchor: &str) -> Text {
-    Text::new(words)
-        .set("x", hundredths(x))
-        .set("y", hundredths(y))
-        .set("text-anchor", anchor)
-}
-
-fn segment([from, to]: [(f64, f64); 2], color: &str, width: f64) -> Line {
-    Line::new()
-        .set("x1", hundredths(from.0))
-        .set("y1", hundredths(from.1))
-        .set("x2", hundredths(to.0))
-        .set("y2", hundredths(to.1))
-        .set("stroke", color)
-        .set("stroke-width", width)
-}
-
-fn dot((x, y): (f64, f64), color: &str, font: f64) -> Circle {
-    Circle::new()
-        .set("cx", hundredths(x))
-        .set("cy", hundredths(y))
-        .set("r", hundredths(0.3 * font))
-        .set("fill", color)
-}
-
-/// Dashes and the gaps between them (pixels).
-fn dashes(key: &Key, font: f64) -> Option<String> {
-    let [dash, gap] = key.dash?;
-    Some(format!(
-        "{} {}",
-        hundredths(dash * font),
-        hundredths(gap * font)
-    ))
 }
 
 #[cfg(test)]

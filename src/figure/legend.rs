@@ -1,12 +1,10 @@
 //! What is written under a packing: its numbers, what colours and lines mean, and in small print what to beware of.
 
 use super::INK;
-use super::shades::hundredths;
+use super::shapes::{self, CHARACTER, hundredths};
 use svg::Node;
 use svg::node::element::{Group, Text};
 
-/// Width of a character in a line (font sizes), a little more than the mean of the typeface.
-const CHARACTER: f64 = 0.58;
 /// Distance of lines (font sizes).
 const LINE: f64 = 1.5;
 /// Distance of items (font sizes).
@@ -85,14 +83,11 @@ impl Legend {
 
     /// A text whose middle is at this height.
     pub(super) fn write(&mut self, text: &str, (x, middle): (f64, f64), anchor: &str) {
-        self.group.append(
-            Text::new(text)
-                .set("x", hundredths(x))
-                .set("y", hundredths(middle + 0.36 * self.font))
-                .set("text-anchor", anchor),
-        );
+        let at = (x, middle + 0.36 * self.font);
+        self.group.append(shapes::text(text, at, anchor));
     }
 
+    /// What belongs to the item at hand.
     pub(super) fn add(&mut self, item: impl Into<Box<dyn Node>>) {
         self.group.append(item);
     }

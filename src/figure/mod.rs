@@ -17,11 +17,13 @@
 
 mod axis;
 mod chart;
+mod keys;
 mod legend;
 mod packing;
 mod pdf;
 mod relaxation;
 mod shades;
+mod shapes;
 
 pub use axis::{Axis, Scale};
 pub use chart::{CHART_WIDTH, CURVE_COLORS, Curve, Mark, chart, chart_in};
@@ -29,13 +31,13 @@ pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation, relaxation_in};
 
 use crate::record::{NewFile, RecordError};
-use resvg::tiny_skia::{Color, Pixmap, Transform};
-use resvg::usvg::{Options, Tree};
-use std::io::Write as _;
-use std::path::Path;
-
 use crate::replay::guarded;
 use crate::text::{lines, shown};
+use resvg::tiny_skia::{Color, Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+use shapes::hundredths;
+use std::io::Write as _;
+use std::path::Path;
 
 /// The typeface of all figures.
 const FONT: &str = "DejaVu Sans";
@@ -282,10 +284,7 @@ fn font_size(width: f64) -> f64 {
 
 /// Each `f_max` of an SVG as it is printed, in text of the given font size.
 fn with_f_max(svg: &str, size: f64) -> String {
-    let (small, down) = (
-        shades::hundredths(0.7 * size),
-        shades::hundredths(0.2 * size),
-    );
+    let (small, down) = (hundredths(0.7 * size), hundredths(0.2 * size));
     let printed = |behind: &str| {
         format!(
             "<tspan font-style=\"italic\">f</tspan><tspan font-size=\"{small}\" dy=\"{down}\">max</tspan><tspan dy=\"-{down}\">{behind}</tspan>"

@@ -1,8 +1,9 @@
 //! A packing: particles as filled contours, contacts as force chains.
 
 use super::legend::{Legend, length};
-use super::shades::{PALE, Shades, hundredths};
-use super::{FONTS, INK, font_size, power_of_ten, with_f_max};
+use super::shades::{PALE, Shades};
+use super::shapes::{circle, frame as framed, hundredths, line, page, paper, rectangle};
+use super::{INK, font_size, power_of_ten, with_f_max};
 use crate::contacts::{Contacts, FrameContacts};
 use crate::contacts::{largest_force, net_forces};
 use crate::domain::{Domain, Vec2};
@@ -12,9 +13,9 @@ use crate::state::Frame;
 use crate::state::Packing;
 use crate::text::counted;
 use core::f64::consts::PI;
+use svg::Node as _;
 use svg::node::element::path::Data;
-use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Path, Rectangle};
-use svg::{Document, Node as _};
+use svg::node::element::{ClipPath, Definitions, Group, Path};
 
 /// What a particle is drawn as.
 ///
@@ -144,34 +145,13 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     let (legend, end) = legend.end();
 
     let total = (hundredths(style.width), (end + 10.0).ceil());
-    let outline = || {
-        Rectangle::new()
-            .set("x", x)
-            .set("y", y)
-            .set("width", width)
-            .set("height", height)
-    };
+    let outline = || rectangle((x, y), (width, height));
     let clip = ClipPath::new().set("id", "box").add(outline());
-    let svg = Document::new()
-        .set("viewBox", (0, 0, total.0, total.1))
-        .set("width", total.0)
-        .set("height", total.1)
-        .set("font-family", FONTS)
+    let svg = page(total)
         .add(Definitions::new().add(clip))
-        // Paper, so that the ink can be read on a dark page too.
-        .add(
-            Rectangle::new()
-                .set("width", "100%")
-                .set("height", "100%")
-                .set("fill", "white"),
-        )
+        .add(paper())
         .add(inside)
-        .add(
-            outline()
-                .set("fill", "none")
-                .set("stroke", INK)
-                .set("stroke-width", 1.2),
-        )
+        .add(framed(outline(), 1.2))
         .add(legend)
         .to_string();
     symbols(&svg, font_size(style.width))
@@ -216,11 +196,7 @@ fn particles(
             Shape::Disk => {
                 let corner = Vec2::repeat(radius);
                 for shift in sheet.images(&[center - corner, center + corner]) {
-                    let (x, y) = sheet.place(center + shift);
-                    let disk = Circle::new()
-                        .set("cx", x)
-                        .set("cy", y)
-                        .set("r", sheet.pixels(radius));
+                    let disk = circle(sheet.place(center + shift), sheet.pixels(radius));
                     outlines.append(disk.clone());
                     particles.append(disk.set("fill", shades.fill(p)));
                 }
@@ -241,15 +217,8 @@ fn rattlers(count: usize, outline: f64, legend: &mut Legend) {
     let font = legend.font();
     let text = counted(count, "rattler");
     let (left, middle) = legend.place((length(&text) + 1.7, 1.8));
-    legend.add(
-        Circle::new()
-            .set("cx", hundredths(left + 0.6 * font))
-            .set("cy", hundredths(middle))
-            .set("r", hundredths(0.6 * font))
-            .set("fill", PALE)
-            .set("stroke", INK)
-            .set("stroke-width", outline),
-    );
+    let rattler = circle((left + 0.6 * font, middle), 0.6 * font).set("fill", PALE);
+    legend.add(rattler.set("stroke", INK).set("stroke-width", outline));
     legend.write(&text, (left + 1.7 * font, middle), "start");
 }
 
@@ -305,15 +274,8 @@ impl Chains {
             let ends = [from, from - contacts.normals[c] * contacts.distances[c]];
             let relative = (contacts.forces[c] / self.average).clamp(0.0, STRONGEST);
             for shift in sheet.images(&ends) {
-                let [(x1, y1), (x2, y2)] = ends.map(|v| sheet.place(v + shift));
-                group.append(
-                    Line::new()
-                        .set("x1", x1)
-                        .set("y1", y1)
-                        .set("x2", x2)
-                        .set("y2", y2)
-                        .set("stroke-width", hundredths(self.usual * relative)),
-                );
+                let ends = ends.map(|v| sheet.place(v + shift));
+                group.append(line(ends, self.usual * relative));
             }
         }
         group
@@ -324,22 +286,16 @@ impl Chains {
         let (font, title) = (legend.font(), "f / ⟨f⟩");
         let most = if self.beyond { "≥ 3" } else { "3" };
         let samples = [(0.5, "0.5"), (1.0, "1"), (STRONGEST, most)];
-        let (line, gap) = (2.0, 0.5);
+        let (long, gap) = (2.0, 0.5);
         let mut x = length(title) + gap;
-        let each = samples.map(|(_, label)| line + gap + length(label) + gap);
+        let each = samples.map(|(_, label)| long + gap + length(label) + gap);
         let (left, middle) = legend.place((x + each.iter().sum::<f64>(), 1.8));
         legend.write(title, (left, middle), "start");
         for ((relative, label), room) in samples.into_iter().zip(each) {
-            legend.add(
-                Line::new()
-                    .set("x1", hundredths(left + x * font))
-                    .set("x2", hundredths(left + (x + line) * font))
-                    .set("y1", hundredths(middle))
-                    .set("y2", hundredths(middle))
-                    .set("stroke", INK)
-                    .set("stroke-width", hundredths(self.usual * relative)),
-            );
-            legend.write(label, (left + (x + line + gap) * font, middle), "start");
+            let at = |x: f64| (left + x * font, middle);
+            let sample = line([at(x), at(x + long)], self.usual * relative);
+            legend.add(sample.set("stroke", INK));
+            legend.write(label, at(x + long + gap), "start");
             x += room;
         }
     }

@@ -2,13 +2,14 @@
 
 use super::ColorBy;
 use super::legend::{Legend, length};
+use super::shapes::{hundredths, line, rectangle};
 use crate::analysis::held;
 use crate::contacts::Contacts;
 use crate::models::droplet::contour::Contours;
 use crate::state::Frame;
 use core::f64::consts::PI;
 use svg::Node as _;
-use svg::node::element::{Group, Line, Rectangle};
+use svg::node::element::Group;
 
 /// The colour of a particle that nothing is said of.
 const PLAIN: &str = "#cfdfe8";
@@ -113,14 +114,8 @@ impl Shades {
             let value = low + (high - low) * (k as f64 + 0.5) / STEPS as f64;
             // A little wider, so that no light shows between.
             let wide = if k + 1 < STEPS { step + 0.6 } else { step };
-            bar.append(
-                Rectangle::new()
-                    .set("x", hundredths(from + k as f64 * step))
-                    .set("y", hundredths(top))
-                    .set("width", hundredths(wide))
-                    .set("height", hundredths(thick))
-                    .set("fill", self.shade(value)),
-            );
+            let piece = rectangle((from + k as f64 * step, top), (wide, thick));
+            bar.append(piece.set("fill", self.shade(value)));
         }
         legend.add(bar);
         let shown = self.values.iter().zip(&self.held).filter(|v| *v.1);
@@ -140,15 +135,8 @@ impl Shades {
         let (mut taken, end) = (f64::MIN, at(high) - half(high));
         for &value in &self.range.ticks {
             let x = hundredths(from + font * at(value));
-            legend.add(
-                Line::new()
-                    .set("x1", x)
-                    .set("x2", x)
-                    .set("y1", hundredths(top + thick))
-                    .set("y2", hundredths(top + thick + 3.0))
-                    .set("stroke", super::INK)
-                    .set("stroke-width", 0.8),
-            );
+            let mark = line([(x, top + thick), (x, top + thick + 3.0)], 0.8);
+            legend.add(mark.set("stroke", super::INK));
             let fits = at(value) - half(value) > taken && at(value) + half(value) < end;
             if fits || value == low || value == high {
                 taken = at(value) + half(value);
@@ -226,10 +214,6 @@ fn short(x: f64) -> String {
     let text = format!("{x:.3e}");
     text.parse::<f64>()
         .map_or(text, |rounded| rounded.to_string())
-}
-
-pub(super) fn hundredths(x: f64) -> f64 {
-    libm::round(100.0 * x) / 100.0
 }
 
 #[cfg(test)]
