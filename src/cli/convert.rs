@@ -3,9 +3,8 @@
 use super::flags::ChannelFlags;
 use super::lines::Lines;
 use super::memory::MemoryFlag;
-use super::output::{Output, end_when_interrupted, open_with};
+use super::output::{Output, end_when_interrupted};
 use super::{Verdict, report};
-use indicatif::HumanBytes;
 use softjam::convert::{self, ConvertError};
 use softjam::record::Writer;
 use softjam::replay::{ReadError, Recording};
@@ -55,7 +54,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let mut recording = Recording::open_within(&arguments.input, arguments.memory.budget())?;
     let held = recording.scene().channels;
     let channels = arguments.channels.over(held)?.unwrap_or(held);
-    write(&mut recording, &output, channels, arguments.force)
+    write(&mut recording, &output, channels)
 }
 
 /// Writes what `channels` ask of a recording, and says what came of it.
@@ -63,10 +62,9 @@ pub(super) fn write(
     recording: &mut Recording,
     output: &Output,
     channels: Channels,
-    force: bool,
 ) -> anyhow::Result<Verdict> {
     let header = convert::header(recording, channels)?;
-    let writer = Writer::start_conversion(output.format, output.begin(force)?, header)?;
+    let writer = Writer::start_conversion(output.format, output.begin()?, header)?;
     let converted = convert::convert(recording, writer, &channels);
     let without_states = !recording.scene().channels.state.is_on();
     let converted = converted.map_err(|error| match error {
@@ -83,23 +81,12 @@ pub(super) fn write(
         other => other.into(),
     })?;
     let mut lines = Lines::default();
-    let path = shown(&output.path.display().to_string());
-    lines.line(
-        "file",
-        format!(
-            "{path} ({}, {})",
-            HumanBytes(converted.written.bytes),
-            counted(converted.written.states, "state")
-        ),
-    );
+    output.tell(&converted.written, &mut lines);
     if converted.rebuilt > 0 {
         let steps = counted(converted.rebuilt, "step");
-        lines.line(
-            "rebuilt",
-            format!("{steps} computed again, in agreement with the recorded states"),
-        );
+        let rebuilt = format!("{steps} computed again, in agreement with the recorded states");
+        lines.line("rebuilt", rebuilt);
     }
-    lines.line("open it with", open_with(&output.path, output.format));
     report(&lines.into_text())?;
     if recording.is_closed() {
         return Ok(Verdict::Good);
@@ -107,6 +94,7 @@ pub(super) fn write(
     let intact = recording
         .intact()
         .map_or("no state".to_owned(), |step| format!("step {step}"));
+    let path = shown(&output.path.display().to_string());
     anyhow::bail!(
         "{} breaks off; {path} is whole up to {intact} and names no result",
         shown(recording.path()),

@@ -48,7 +48,7 @@ pub struct SceneFlags {
     #[arg(long, help_heading = PACKING)]
     relax_disks: bool,
 
-    /// Line tension γ of the contours, the unit of force, 1e-100 … 1e100 [default: 1].
+    /// Line tension γ, the unit of force, 1e-100 … 1e100; disks have the stiffness k = 4πγ / 3(R_i + R_j) [default: 1].
     #[arg(long, value_name = "GAMMA", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
     line_tension: Option<f64>,
 
@@ -68,7 +68,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "MINIMIZER", value_parser = named::<softjam::scene::Minimizer>, help_heading = RELAXATION)]
     minimizer: Option<softjam::scene::Minimizer>,
 
-    /// Forces: central (along the lines of centres) or gradient (of the stored energy) [default: central].
+    /// Forces between droplets: central (along the lines of centres) or gradient (of the stored energy) [default: central].
     #[arg(long, value_name = "FORM", value_parser = named::<softjam::models::droplet::Form>, help_heading = RELAXATION)]
     forces: Option<softjam::models::droplet::Form>,
 
@@ -77,19 +77,19 @@ pub struct SceneFlags {
     #[arg(long, value_name = "DT", value_parser = real, allow_negative_numbers = true, help_heading = RELAXATION)]
     dt_max: Option<f64>,
 
-    /// How the contact list follows the positions: complementarity (solved for in every step) or saitoh (one drop-and-add a
+    /// How the contacts of droplets follow the positions: complementarity (solved for in every step) or saitoh (one drop-and-add a
     /// step, as in the paper) [default: complementarity].
     #[arg(long, value_name = "RULE", value_parser = named::<softjam::models::droplet::contact::Rule>, help_heading = RELAXATION)]
     contact_rule: Option<softjam::models::droplet::contact::Rule>,
 
-    /// How A f = δ is solved: conjugate-gradient, sparse-cholesky or gauss-jordan [default: conjugate-gradient].
+    /// How the equations A f = δ of droplets are solved: conjugate-gradient, sparse-cholesky or gauss-jordan [default: conjugate-gradient].
     #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::models::droplet::contact::solver::Method>, help_heading = RELAXATION)]
     contact_solver: Option<softjam::models::droplet::contact::solver::Method>,
 
     #[command(flatten)]
     channels: ChannelFlags,
 
-    /// Vertices of a contour, 3 … 4096, beside those on the contacts [default: 32].
+    /// Vertices of a contour or a disk, 3 … 4096, beside those on the contacts [default: 32].
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = RECORDING)]
     vertices: Option<usize>,
 }

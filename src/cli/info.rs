@@ -5,6 +5,7 @@ mod table;
 use super::lines::Lines;
 use super::memory::MemoryFlag;
 use super::{Verdict, complain, print};
+use serde_json::{Map, Value, json};
 use softjam::analysis::FrameForces;
 use softjam::analysis::Observables;
 use softjam::analysis::Stability;
@@ -14,10 +15,9 @@ use softjam::models::droplet::validity::{SQUEEZE_LIMIT, Validity};
 use softjam::record::Outcome;
 use softjam::replay::{Event, ReadError, Recording, Standing};
 use softjam::state::Frame;
-use softjam::text::{counted, length, shown};
+use softjam::text::{counted, shown};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use table::Row;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -151,42 +151,35 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
             None => Ok(Verdict::Bad),
         };
     }
-    let (mut rows, mut objects) = (Vec::new(), Vec::new());
+    let mut objects = Vec::new();
     let mut verdict = Verdict::Good;
     for file in &arguments.files {
         let name = file.display().to_string();
-        match read(file, budget) {
+        let (object, damage) = match read(file, budget) {
             Ok((recording, found)) => {
-                if arguments.json {
-                    objects.push(json(&name, &recording, &found));
-                } else {
-                    rows.push(Row::of(&name, &recording, &found));
+                if found.standing(&recording) != Standing::Converged {
+                    verdict.worsen();
                 }
-                let standing = found.standing(&recording);
-                match found.damage {
-                    Some(error) => {
-                        complain(&error.into());
-                        verdict = Verdict::Incomplete;
-                    }
-                    None if standing != Standing::Converged => verdict.worsen(),
-                    None => {}
-                }
+                (json(&name, &recording, &found), found.damage)
             }
             Err(error) => {
-                objects
-                    .push(serde_json::json!({ "file": shown(&name), "damage": error.to_string() }));
-                rows.push(Row::unreadable(&name));
-                complain(&error.into());
-                verdict = Verdict::Incomplete;
+                let (file, damage) = (shown(&name), error.to_string());
+                let object = json!({ "file": file, "status": "unreadable", "damage": damage });
+                (object, Some(error))
             }
+        };
+        objects.push(object);
+        if let Some(error) = damage {
+            complain(&error.into());
+            verdict = Verdict::Incomplete;
         }
     }
     print(&if arguments.json {
-        format!("{:#}\n", serde_json::Value::Array(objects))
+        format!("{:#}\n", Value::Array(objects))
     } else if arguments.csv {
-        table::csv(&rows)
+        table::csv(&objects)
     } else {
-        table::text(&rows)
+        table::text(&objects)
     })?;
     Ok(verdict)
 }
@@ -216,39 +209,24 @@ fn state_of(recording: &Recording, found: &Findings) -> String {
 fn text(path: &str, recording: &Recording, found: &Findings) -> String {
     let closed = recording.is_closed();
     let mut lines = Lines::default();
-    let l = recording.domain().lengths();
     let scene = recording.scene();
     lines.line("file", path.to_owned());
-    lines.line(
-        "recorded by",
-        format!("{} (bits {})", recording.program(), recording.bits()),
-    );
+    let (program, bits) = (recording.program(), recording.bits());
+    lines.line("recorded by", format!("{program} (bits {bits})"));
     lines.line("result", state_of(recording, found));
-    lines.line(
-        "packing",
-        format!(
-            "N = {}, φ = {:.4}, box {} × {}, γ = {}",
-            recording.radii().len(),
-            recording.coverage(),
-            length(l.x),
-            length(l.y),
-            scene.line_tension
-        ),
-    );
-    if recording.from_step() > 0 {
+    let (n, phi) = (recording.radii().len(), recording.coverage());
+    let gamma = format!("γ = {}", scene.line_tension);
+    lines.packing(scene, n, phi, recording.domain(), &gamma);
+    let from = recording.from_step();
+    if from > 0 {
         let changed = recording.legs().iter().any(|leg| leg.changes(scene));
         let how = if changed {
             ", there or before with another threshold, minimiser or forces"
         } else {
             ""
         };
-        lines.line(
-            "goes on",
-            format!(
-                "from step {} of another recording{how}",
-                recording.from_step()
-            ),
-        );
+        let goes_on = format!("from step {from} of another recording{how}");
+        lines.line("goes on", goes_on);
     }
     for (channel, (count, first, last)) in &found.channels {
         let pictures =
@@ -278,28 +256,18 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
         lines.line("digest", format!("{digest} (state of step {})", last.step));
     }
     if let Some(squeeze) = found.squeeze(recording) {
-        lines.line(
-            "squeeze",
-            format!(
-                "mean {:.4}, largest {:.4} (particle {}); {} of {} beyond {SQUEEZE_LIMIT}",
-                squeeze.mean,
-                squeeze.largest,
-                squeeze.particle,
-                squeeze.beyond,
-                counted(squeeze.particles, "particle")
-            ),
+        let (mean, largest, particle) = (squeeze.mean, squeeze.largest, squeeze.particle);
+        let (beyond, of) = (squeeze.beyond, counted(squeeze.particles, "particle"));
+        let squeeze = format!(
+            "mean {mean:.4}, largest {largest:.4} (particle {particle}); {beyond} of {of} beyond {SQUEEZE_LIMIT}"
         );
+        lines.line("squeeze", squeeze);
     }
     if let Some(o) = found.observables(recording) {
-        lines.line(
-            "stress",
-            format!(
-                "σ_xx {:.6e}, σ_yy {:.6e}, σ_xy {:.6e} γ/length (tension positive)",
-                o.stress_xx(),
-                o.stress_yy(),
-                o.stress_xy()
-            ),
-        );
+        let (xx, yy, xy) = (o.stress_xx(), o.stress_yy(), o.stress_xy());
+        let stress =
+            format!("σ_xx {xx:.6e}, σ_yy {yy:.6e}, σ_xy {xy:.6e} γ/length (tension positive)");
+        lines.line("stress", stress);
     }
     for (name, value) in &found.metrics {
         let counts = ["contacts", "rattlers"].contains(name);
@@ -318,28 +286,29 @@ fn hex(digest: [u8; 32]) -> String {
     blake3::Hash::from_bytes(digest).to_hex().to_string()
 }
 
-fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Value {
-    let l = recording.domain().lengths();
-    let channels: serde_json::Map<String, serde_json::Value> = found
+fn json(path: &str, recording: &Recording, found: &Findings) -> Value {
+    let (scene, l) = (recording.scene(), recording.domain().lengths());
+    let channels: Map<String, Value> = found
         .channels
         .iter()
         .map(|(name, (count, first, last))| {
-            let value = serde_json::json!({ "steps": count, "first": first, "last": last });
+            let value = json!({ "steps": count, "first": first, "last": last });
             (name.clone(), value)
         })
         .collect();
-    serde_json::json!({
+    json!({
         "file": shown(path),
         "program": recording.program(),
         "bits": recording.bits(),
-        "model": recording.scene().model.name(),
+        "model": scene.model.name(),
         "particles": recording.radii().len(),
         "phi": recording.coverage(),
-        "seed": table::seed(recording),
+        "seed": (!scene.starts_from_file()).then_some(scene.seed),
         "box": [l.x, l.y],
         "status": found.standing(recording).to_string(),
         "from_step": recording.from_step(),
         "legs": recording.legs(),
+        "intact": recording.intact(),
         "closed": recording.is_closed(),
         "converged": found.result.map(|r| r.converged),
         "stability": found.result.and_then(|r| r.stability).map(Stability::name),
@@ -347,20 +316,20 @@ fn json(path: &str, recording: &Recording, found: &Findings) -> serde_json::Valu
         "f_max": found.result.map(|r| r.f_max),
         "channels": channels,
         "digest": found.last.as_ref().map(|last| hex(last.digest())),
-        "squeeze": found.squeeze(recording).map(|s| serde_json::json!({
+        "squeeze": found.squeeze(recording).map(|s| json!({
             "mean": s.mean,
             "largest": s.largest,
             "particle": s.particle,
             "beyond": s.beyond,
             "limit": SQUEEZE_LIMIT,
         })),
-        "stress": found.observables(recording).map(|o| serde_json::json!({
+        "stress": found.observables(recording).map(|o| json!({
             "xx": o.stress_xx(),
             "yy": o.stress_yy(),
             "xy": o.stress_xy(),
         })),
         "metrics": found.metrics,
         "damage": found.damage.as_ref().map(ToString::to_string),
-        "scene": recording.scene().to_toml(),
+        "scene": scene.to_toml(),
     })
 }

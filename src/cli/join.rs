@@ -45,5 +45,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let parts = parts.map(|path| Recording::open_within(path, budget));
     let mut whole = Recording::joined(parts.collect::<Result<_, _>>()?)?;
     let channels = whole.scene().channels;
-    convert::write(&mut whole, &output, channels, arguments.force)
+    convert::write(&mut whole, &output, channels)
 }

@@ -17,13 +17,16 @@ mod replay;
 mod scene;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
 use softjam::BITS;
 use softjam::convert::ConvertError;
 use softjam::figure::FigureError;
 use softjam::protocol::RelaxError;
 use softjam::record::{FORMAT_VERSION, RecordError};
-use softjam::replay::ReadError;
+use softjam::replay::{Event, ReadError, Recording};
 use softjam::scene::SceneError;
+use softjam::state::Frame;
+use std::fmt::Display;
 use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -38,7 +41,7 @@ Exit codes:
   3  done, and the verdict is bad (not converged within the step limit; info: not converged, for whatever reason; replay differs;
      forces out of balance)";
 
-/// Relaxes packings of deformable particles (the Morse–Witten model) to mechanical equilibrium and records how.
+/// Relaxes packings of soft particles, droplets (the Morse–Witten model) or disks, to mechanical equilibrium and records how.
 #[derive(Parser)]
 #[command(version = version(), about, long_about = None, after_help = EXIT_CODES, propagate_version = true)]
 struct Cli {
@@ -154,20 +157,9 @@ fn message(error: &anyhow::Error) -> String {
 
 /// 2 for a request that makes no sense, 1 for one that could not be met.
 fn exit_code(error: &anyhow::Error) -> u8 {
-    let scene = |e: &SceneError| match e {
-        SceneError::Read { .. } => 1,
-        _ => 2,
-    };
-    if let Some(e) = error.downcast_ref::<SceneError>() {
-        return scene(e);
-    }
-    if let Some(ConvertError::NoState { .. } | ConvertError::Scene(_)) =
-        error.downcast_ref::<ConvertError>()
-    {
-        return 2;
-    }
+    let scene = |e: &SceneError| !matches!(e, SceneError::Read { .. });
     let file = |e: &RecordError| {
-        let is_in_the_way = matches!(
+        matches!(
             e,
             RecordError::Exists { .. }
                 | RecordError::Busy { .. }
@@ -175,29 +167,76 @@ fn exit_code(error: &anyhow::Error) -> u8 {
                 | RecordError::Name { .. }
                 | RecordError::NotMcap { .. }
                 | RecordError::Twice { .. }
-        );
-        if is_in_the_way { 2 } else { 1 }
+        )
     };
-    let is_join = |e: &ReadError| matches!(e, ReadError::Join { .. });
-    if error.downcast_ref::<ReadError>().is_some_and(is_join) {
-        return 2;
+    let convert = |e: &ConvertError| match e {
+        ConvertError::Write(e) => file(e),
+        e => matches!(e, ConvertError::NoState { .. } | ConvertError::Scene(_)),
+    };
+    let figure = |e: &FigureError| match e {
+        FigureError::File(e) => file(e),
+        e => matches!(e, FigureError::Name { .. } | FigureError::Nothing(_)),
+    };
+    let read = |e: &ReadError| matches!(e, ReadError::Join { .. });
+    let relax = |e: &RelaxError| matches!(e, RelaxError::Scene(e) if scene(e));
+    let makes_no_sense = error.downcast_ref().is_some_and(scene)
+        || error.downcast_ref().is_some_and(file)
+        || error.downcast_ref().is_some_and(convert)
+        || error.downcast_ref().is_some_and(figure)
+        || error.downcast_ref().is_some_and(read)
+        || error.downcast_ref().is_some_and(relax);
+    if makes_no_sense { 2 } else { 1 }
+}
+
+/// The refusal of a value.
+fn out_of_range(field: &str, value: impl Display, allowed: String) -> anyhow::Error {
+    let (field, value) = (field.to_owned(), value.to_string());
+    let error = SceneError::Range {
+        field,
+        value,
+        allowed,
+    };
+    error.into()
+}
+
+/// The refusal of a value that needs something.
+fn needs(field: &str, value: impl Display, needs: String) -> anyhow::Error {
+    let (field, value) = (field.to_owned(), value.to_string());
+    let error = SceneError::Needs {
+        field,
+        value,
+        needs,
+    };
+    error.into()
+}
+
+/// The recorded state of a step, or of the nearest before it; without a step the last.
+fn state_at(recording: &mut Recording, step: Option<u64>) -> Result<Option<Frame>, ReadError> {
+    let mut found = None;
+    // Not consumed: the recording is asked for its packing afterwards.
+    for event in recording.by_ref() {
+        if let Event::State(frame) = event? {
+            let at = frame.step;
+            if step.is_none_or(|k| at <= k) {
+                found = Some(frame);
+            }
+            if step.is_some_and(|k| at >= k) {
+                break;
+            }
+        }
     }
-    if let Some(ConvertError::Write(e)) = error.downcast_ref::<ConvertError>() {
-        return file(e);
-    }
-    match error.downcast_ref::<FigureError>() {
-        Some(FigureError::Name { .. } | FigureError::Nothing(_)) => return 2,
-        Some(FigureError::File(e)) => return file(e),
-        _ => {}
-    }
-    match (
-        error.downcast_ref::<RelaxError>(),
-        error.downcast_ref::<RecordError>(),
-    ) {
-        (Some(RelaxError::Scene(e)), _) => scene(e),
-        (_, Some(e)) => file(e),
-        _ => 1,
-    }
+    Ok(found)
+}
+
+/// A progress bar on standard error; it is hidden where nobody would see it move.
+fn bar(template: &str) -> ProgressBar {
+    let bar = if talks() {
+        ProgressBar::new(1000)
+    } else {
+        ProgressBar::hidden()
+    };
+    let style = ProgressStyle::with_template(template);
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 fn warn(text: &str) {

@@ -1,7 +1,10 @@
 //! Files that a verb writes: whether they can be, before minutes are spent on what to write.
 
+use super::lines::Lines;
 use super::warn;
-use softjam::record::{self, Format, NewFile, RecordError};
+use indicatif::HumanBytes;
+use softjam::record::{self, Format, NewFile, RecordError, Written};
+use softjam::text::counted;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,38 +12,59 @@ use std::path::{Path, PathBuf};
 pub struct Output {
     pub path: PathBuf,
     pub format: Format,
+    /// Whether it may replace another file.
+    force: bool,
 }
 
 impl Output {
     /// A recording whose name says its format; it has to be none of `inputs`, and may replace another only with `force`.
     pub fn named(path: &Path, inputs: &[Option<&Path>], force: bool) -> Result<Self, RecordError> {
-        check_place(path, inputs)?;
-        let format = Format::named(path)?;
-        check_absent(path, force)?;
-        Ok(Self {
-            path: path.to_owned(),
-            format,
-        })
+        Self::of(path, Format::named(path), inputs, force)
     }
 
     /// [`named`](Self::named) of an MCAP file.
     pub fn mcap(path: &Path, inputs: &[Option<&Path>], force: bool) -> Result<Self, RecordError> {
+        let format = Format::Mcap.suits(path).then_some(Format::Mcap);
+        let format = format.ok_or_else(|| RecordError::NotMcap {
+            path: path.display().to_string(),
+        });
+        Self::of(path, format, inputs, force)
+    }
+
+    fn of(
+        path: &Path,
+        format: Result<Format, RecordError>,
+        inputs: &[Option<&Path>],
+        force: bool,
+    ) -> Result<Self, RecordError> {
         check_place(path, inputs)?;
-        if !Format::Mcap.suits(path) {
-            return Err(RecordError::NotMcap {
-                path: path.display().to_string(),
-            });
-        }
+        let format = format?;
         check_absent(path, force)?;
         Ok(Self {
             path: path.to_owned(),
-            format: Format::Mcap,
+            format,
+            force,
         })
     }
 
     /// Begins the file: nobody else can write it from now on.
-    pub fn begin(&self, force: bool) -> Result<NewFile, RecordError> {
-        NewFile::create(&self.path, force)
+    pub fn begin(&self) -> Result<NewFile, RecordError> {
+        NewFile::create(&self.path, self.force)
+    }
+
+    /// Says what was written, and how to look at it.
+    pub fn tell(&self, written: &Written, lines: &mut Lines) {
+        let (path, size) = (self.path.display(), HumanBytes(written.bytes));
+        let states = counted(written.states, "state");
+        lines.line("file", format!("{path} ({size}, {states})"));
+        let rerun = format!("rerun {path}");
+        lines.line(
+            "open it with",
+            match self.format {
+                Format::Rrd => rerun,
+                Format::Mcap => format!("Foxglove with examples/foxglove-layout.json, or {rerun}"),
+            },
+        );
     }
 }
 
@@ -93,13 +117,4 @@ pub fn end_when_interrupted() -> anyhow::Result<()> {
         });
     })?;
     Ok(())
-}
-
-/// How to look at a file.
-pub fn open_with(path: &Path, format: Format) -> String {
-    let path = path.display();
-    match format {
-        Format::Rrd => format!("rerun {path}"),
-        Format::Mcap => format!("Foxglove with examples/foxglove-layout.json, or rerun {path}"),
-    }
 }

@@ -1,27 +1,20 @@
 //! `softjam record`: relaxes a scene and records it.
 
+mod origin;
+mod report;
+
 use super::flags::{RECORDING, RELAXATION, SceneFlags};
-use super::lines::Lines;
 use super::live::LiveFlags;
 use super::memory::MemoryFlag;
-use super::output::{Output, open_with};
-use super::{Verdict, talks, warn};
-use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
-use softjam::BITS;
-use softjam::analysis::Observables;
-use softjam::analysis::Stability;
+use super::output::Output;
+use super::{Verdict, bar, warn};
+use indicatif::ProgressBar;
+use origin::Origin;
 use softjam::numerics::threads;
-use softjam::protocol::{Relaxation, Status};
-use softjam::record::{self, Header, Leg, RecordError, Summary, Writer};
-use softjam::replay::{Event, Recording};
-use softjam::scene::start::StartFile;
-use softjam::scene::{Minimizer, Scene, SceneError, SceneFields, Start};
-use softjam::state::Frame;
-use softjam::state::Packing;
-use softjam::text::{counted, length, shown};
-use std::io::IsTerminal as _;
+use softjam::protocol::Relaxation;
+use softjam::record::{self, Header, RecordError, Writer};
+use softjam::scene::{Minimizer, Scene, SceneFields, Start};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -96,47 +89,33 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
 }
 
 fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
+    let budget = arguments.memory.budget();
     let (origin, outputs) = match &arguments.from {
         None => {
             let scene = arguments.scene.scene()?;
             // Before a start file is waited for, which may be a pipe.
             let outputs = outputs(arguments, &scene)?;
-            (beginning(arguments, scene)?, outputs)
+            let file = arguments.scene.file();
+            (Origin::of_scene(scene, file, budget)?, outputs)
         }
         Some(path) => {
-            let origin = recorded_frame(path, arguments)?;
-            let outputs = outputs(arguments, origin.scene())?;
+            let over = |fields: SceneFields| arguments.scene.scene_over(fields);
+            let origin = Origin::of_recording(path, arguments.step, over, budget)?;
+            let outputs = outputs(arguments, &origin.scene)?;
             (origin, outputs)
         }
     };
-    let (scene, legs) = (origin.scene().clone(), origin.legs());
-    fits_in_memory(&origin, &arguments.memory)?;
-    // Newton's method carries the forces along with the positions; only round-off holds it up.
-    let (least, reason) = match scene.minimizer {
-        Minimizer::Fire => (
-            scene.contact_tolerance,
-            format!("contact_tolerance = {:e} resolves", scene.contact_tolerance),
-        ),
-        Minimizer::FireNewton => (1e-14, "round-off leaves".to_owned()),
-    };
-    if scene.threshold < least {
-        warn(&format!(
-            "threshold = {:e} is below what {reason}: the run may never converge",
-            scene.threshold
-        ));
-    }
-    let phase = Phase::watch_for_signals()?;
+    origin.fits_in_memory(&arguments.memory)?;
+    let (scene, legs) = (origin.scene.clone(), origin.legs.clone());
+    warn_of_threshold(&scene);
+    watch_for_signals()?;
     // Whoever cannot have a file hears of it before the disks relax.
-    let files = outputs.iter().map(|output| output.begin(arguments.force));
+    let files = outputs.iter().map(Output::begin);
     let files = files.collect::<Result<Vec<_>, _>>()?;
 
     let start = Instant::now();
-    let mut run = match origin {
-        Origin::Scene(scene) => Relaxation::new(&scene)?,
-        Origin::File(scene, packing) => Relaxation::of_start(&scene, packing)?,
-        Origin::Frame(from) => from.run()?,
-    };
-    let disks = start.elapsed();
+    let mut run = origin.run()?;
+    let before = start.elapsed();
     let header = Header {
         legs,
         ..Header::of(&scene, &run)
@@ -145,24 +124,17 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let writers = writers.map(|(output, file)| Writer::start(output.format, file, header.clone()));
     let writers = writers.collect::<Result<Vec<_>, _>>()?;
     let live = arguments.live.start(&header);
-    phase.recording();
-    let from = run.step();
-    let bar = Progress::new(&scene, from);
-    let start = Instant::now();
+    RECORDING_BEGUN.store(true, Ordering::Relaxed);
+    let (from, start) = (run.step(), Instant::now());
+    let bar = bar("{bar:24} {msg}");
     let recorded = record::record_live(&mut run, writers, live.view(), &scene.channels, |run| {
-        bar.show(run, start);
-        phase.goes_on()
+        show(&bar, run, scene.threshold, (from, start));
+        !INTERRUPTED.load(Ordering::Relaxed)
     });
-    bar.clear();
+    bar.finish_and_clear();
     let summary = recorded?;
-    super::report(&report(
-        &outputs,
-        &scene,
-        &run,
-        &summary,
-        from,
-        (disks, start.elapsed()),
-    ))?;
+    let steps = (run.step() - from, start.elapsed());
+    super::report(&report::of(&outputs, &scene, &run, &summary, before, steps))?;
     live.finish(summary.outcome)?;
     let particles = run.packing().len();
     let validity = (scene.model).validity(&run.contacts(), particles, scene.line_tension);
@@ -198,375 +170,66 @@ fn outputs(arguments: &Arguments, scene: &Scene) -> Result<Vec<Output>, RecordEr
     named.into_iter().chain(mcap).collect()
 }
 
-/// What Ctrl-C and SIGTERM find: nothing to lose while the disks relax, a recording to close afterwards.
-#[derive(Clone)]
-struct Phase {
-    recording: Arc<AtomicBool>,
-    interrupted: Arc<AtomicBool>,
-}
-
-impl Phase {
-    fn watch_for_signals() -> anyhow::Result<Self> {
-        let phase = Self {
-            recording: Arc::default(),
-            interrupted: Arc::default(),
-        };
-        let seen = phase.clone();
-        ctrlc::set_handler(move || {
-            let again = seen.interrupted.swap(true, Ordering::Relaxed);
-            if again || !seen.recording.load(Ordering::Relaxed) {
-                record::abandon_new_files(|| {
-                    warn(if again {
-                        "aborted"
-                    } else {
-                        "interrupted before the first frame; no file was made or replaced"
-                    });
-                    std::process::exit(1);
-                });
-            }
-            warn(
-                "ending behind this step; once more to abort, which may leave the file without its last steps",
-            );
-        })?;
-        Ok(phase)
-    }
-
-    fn recording(&self) {
-        self.recording.store(true, Ordering::Relaxed);
-    }
-
-    fn goes_on(&self) -> bool {
-        !self.interrupted.load(Ordering::Relaxed)
-    }
-}
-
-/// Where a run begins.
-enum Origin {
-    Scene(Scene),
-    /// With the packing of a start file, its disks not yet relaxed.
-    File(Scene, Packing),
-    Frame(Box<Continuation>),
-}
-
-impl Origin {
-    fn scene(&self) -> &Scene {
-        match self {
-            Self::Scene(scene) | Self::File(scene, _) => scene,
-            Self::Frame(from) => &from.scene,
+/// Warns of a threshold below what the forces are exact to.
+fn warn_of_threshold(scene: &Scene) {
+    // Newton's method carries the forces along with the positions; only round-off holds it up.
+    let (least, reason) = match scene.minimizer {
+        Minimizer::Fire => {
+            let least = scene.contact_tolerance;
+            (least, format!("contact_tolerance = {least:e} resolves"))
         }
-    }
-
-    fn legs(&self) -> Vec<Leg> {
-        match self {
-            Self::Frame(from) => from.legs.clone(),
-            Self::Scene(_) | Self::File(..) => Vec::new(),
-        }
-    }
-}
-
-/// A recorded frame to go on from.
-struct Continuation {
-    scene: Scene,
-    packing: Packing,
-    frame: Frame,
-    /// What the run went by before.
-    legs: Vec<Leg>,
-    /// Whether its scene is changed at the frame.
-    changed: bool,
-}
-
-impl Continuation {
-    fn new(recording: &Recording, scene: Scene, frame: Frame) -> anyhow::Result<Self> {
-        let packing = recording.packing(&frame)?;
-        let leg = Leg::of(recording.scene(), frame.step);
-        let changed = leg.changes(&scene);
-        let legs = recording.legs().iter().copied();
-        let legs = legs.chain(changed.then_some(leg)).collect();
-        if scene.steps < frame.step {
-            return Err(SceneError::Range {
-                field: "steps".to_owned(),
-                value: scene.steps.to_string(),
-                allowed: format!("steps ≥ {}, the step that the run goes on from", frame.step),
-            }
-            .into());
-        }
-        Ok(Self {
-            scene,
-            packing,
-            frame,
-            legs,
-            changed,
-        })
-    }
-
-    fn run(self) -> anyhow::Result<Relaxation> {
-        let begin = if self.changed {
-            Relaxation::take_over
-        } else {
-            Relaxation::resume
-        };
-        let run = begin(&self.scene, self.packing, self.frame)?;
-        // Its replay would have nothing to run.
-        if run.status() != Status::Running && self.scene.starts_from_file() {
-            let step = run.step();
-            return Err(SceneError::Needs {
-                field: "from".to_owned(),
-                value: format!("step {step}"),
-                needs: "a run that goes on behind it: with this threshold and step limit it ends there; go on from an earlier --step"
-                    .to_owned(),
-            }
-            .into());
-        }
-        Ok(run)
-    }
-}
-
-/// Where a run of a scene begins; its start file is read here, and only here, since it may be a pipe.
-fn beginning(arguments: &Arguments, scene: Scene) -> anyhow::Result<Origin> {
-    let Start::File {
-        path,
-        blake3,
-        preparation,
-    } = &scene.start
-    else {
-        return Ok(Origin::Scene(scene));
+        Minimizer::FireNewton => (1e-14, "round-off leaves".to_owned()),
     };
-    // The name as it was given: no scene holds one that is not UTF-8.
-    let path = arguments.scene.file().unwrap_or(Path::new(path));
-    let file = StartFile::read_within(path, arguments.memory.budget())?;
-    let start = file.start(blake3.as_deref(), *preparation)?;
-    let (packing, coincidences) = file.prepared(*preparation)?;
-    if let Some(first) = coincidences.first() {
+    let threshold = scene.threshold;
+    if threshold < least {
         warn(&format!(
-            "particles of one point are put beside each other, {} of {}; the first: {first}",
-            coincidences.len(),
-            packing.len()
+            "threshold = {threshold:e} is below what {reason}: the run may never converge"
         ));
     }
-    Ok(Origin::File(Scene { start, ..scene }, packing))
 }
 
-/// The frame to go on from, and its scene with what the flags change about its end and its recording.
-fn recorded_frame(path: &Path, arguments: &Arguments) -> anyhow::Result<Origin> {
-    let mut recording = Recording::open_within(path, arguments.memory.budget())?;
-    if !recording.has_same_bits() {
-        return Err(SceneError::Needs {
-            field: "from".to_owned(),
-            value: path.display().to_string(),
-            needs: format!(
-                "a recording with bits {BITS}, as this program computes; it has bits {}, and {} can go on from it",
-                recording.bits(),
-                shown(recording.program())
-            ),
-        }
-        .into());
-    }
-    let fields = SceneFields::from_toml(&recording.scene().to_toml())?;
-    let scene = arguments.scene.scene_over(fields)?;
-    let mut found = None;
-    // Not consumed: the recording is asked for its packing afterwards.
-    for event in recording.by_ref() {
-        if let Event::State(frame) = event? {
-            let step = frame.step;
-            if arguments.step.is_none_or(|k| step <= k) {
-                found = Some(frame);
-            }
-            if arguments.step.is_some_and(|k| step >= k) {
-                break;
-            }
-        }
-    }
-    let last = found.as_ref().map(|frame| frame.step);
-    match found {
-        Some(frame) if arguments.step.is_none_or(|k| k == frame.step) => Ok(Origin::Frame(
-            Box::new(Continuation::new(&recording, scene, frame)?),
-        )),
-        _ if last.is_none() && arguments.step.is_none() => {
-            let closed = recording.is_closed();
-            Err(SceneError::Needs {
-                field: "from".to_owned(),
-                value: path.display().to_string(),
-                needs: if closed {
-                    "a recorded state, which only a recording with --channels state,… has"
-                        .to_owned()
+/// Whether there is a recording to close; before, an interruption loses nothing.
+static RECORDING_BEGUN: AtomicBool = AtomicBool::new(false);
+
+/// Whether Ctrl-C or SIGTERM has come.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+fn watch_for_signals() -> anyhow::Result<()> {
+    ctrlc::set_handler(|| {
+        let again = INTERRUPTED.swap(true, Ordering::Relaxed);
+        if again || !RECORDING_BEGUN.load(Ordering::Relaxed) {
+            record::abandon_new_files(|| {
+                warn(if again {
+                    "aborted"
                 } else {
-                    "a recorded state, and breaks off before the first".to_owned()
-                },
-            }
-            .into())
+                    "interrupted before the first frame; no file was made or replaced"
+                });
+                std::process::exit(1);
+            });
         }
-        _ => Err(SceneError::Range {
-            field: "step".to_owned(),
-            value: arguments.step.map_or("last".to_owned(), |k| k.to_string()),
-            allowed: match last {
-                Some(last) => format!("the recorded states; the nearest before it is {last}"),
-                None => "the recorded states, of which there is none before it".to_owned(),
-            },
-        }
-        .into()),
-    }
-}
-
-/// Refuses a scene that would bring the machine down instead of relaxing.
-fn fits_in_memory(origin: &Origin, memory: &MemoryFlag) -> Result<(), SceneError> {
-    let scene = origin.scene();
-    let particles = match origin {
-        Origin::Frame(from) => from.packing.len(),
-        Origin::File(_, packing) => packing.len(),
-        Origin::Scene(scene) => scene.particles,
-    };
-    let needed = scene.memory_estimate(particles);
-    // Where the system does not tell, it is asked the hard way.
-    match memory.free() {
-        Some(available) if needed > available => Err(SceneError::Memory {
-            particles,
-            needed_mib: needed >> 20,
-            available_mib: available >> 20,
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// The progress bar; none unless standard error is a terminal.
-struct Progress {
-    bar: Option<ProgressBar>,
-    threshold: f64,
-    /// The step that the run begins with.
-    from: u64,
-}
-
-impl Progress {
-    fn new(scene: &Scene, from: u64) -> Self {
-        let bar = (talks() && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::new(1000);
-            let style = ProgressStyle::with_template("{bar:24} {msg}");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar
-        });
-        Self {
-            bar,
-            threshold: scene.threshold,
-            from,
-        }
-    }
-
-    /// The bar follows the decades that f_max has still to fall.
-    fn show(&self, run: &Relaxation, start: Instant) {
-        let Some(bar) = &self.bar else { return };
-        if !run.step().is_multiple_of(16) {
-            return;
-        }
-        let decades = |x: f64| libm::log10(x.max(self.threshold) / self.threshold);
-        let done = 1.0 - decades(run.f_max()) / decades(1.0).max(1.0);
-        bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
-        let seconds = start.elapsed().as_secs_f64().max(1e-9);
-        bar.set_message(format!(
-            "step {}  f_max {:.2e}  contacts {}  {:.0} steps/s",
-            run.step(),
-            run.f_max(),
-            run.contacts().pairs.len(),
-            (run.step() - self.from) as f64 / seconds
-        ));
-    }
-
-    fn clear(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-/// What a physicist wants to read at the end.
-fn report(
-    outputs: &[Output],
-    scene: &Scene,
-    run: &Relaxation,
-    summary: &Summary,
-    from: u64,
-    (start_took, took): (Duration, Duration),
-) -> String {
-    let o: Observables = run.observables();
-    let packing = run.packing();
-    let l = packing.domain().lengths();
-    let verdict = match summary.outcome {
-        None => format!("interrupted at step {}", run.step()),
-        Some(end) if end.stability == Some(Stability::Saddle) => {
-            format!("{end} (--minimizer fire+newton goes on from there)")
-        }
-        Some(end) => end.to_string(),
-    };
-    let mut lines = Lines::default();
-    lines.line("result", verdict);
-    let origin = match &scene.start {
-        Start::File { path, .. } => format!("from {path}"),
-        Start::Random | Start::Hexagonal => format!("seed {}", scene.seed),
-    };
-    lines.line(
-        "packing",
-        format!(
-            "N = {}, φ = {:.4}, box {} × {}, {origin}",
-            packing.len(),
-            packing.coverage(),
-            length(l.x),
-            length(l.y)
-        ),
-    );
-    if let Some(disks) = run.disks() {
-        let ending = if disks.converged { "" } else { " (step limit)" };
-        lines.line(
-            "disks",
-            format!(
-                "{} to f_max = {:.2e} γ, Z = {:.3}{ending}",
-                counted(disks.steps, "step"),
-                disks.f_max,
-                disks.coordination
-            ),
+        warn(
+            "ending behind this step; once more to abort, which may leave the file without its last steps",
         );
+    })?;
+    Ok(())
+}
+
+/// The bar follows the decades that f_max has still to fall; `from` is the step and the time at which the run began.
+fn show(bar: &ProgressBar, run: &Relaxation, threshold: f64, from: (u64, Instant)) {
+    if bar.is_hidden() || !run.step().is_multiple_of(16) {
+        return;
     }
-    lines.line(
-        "f_max",
-        format!("{:.3e} γ (threshold {:.1e} γ)", o.f_max, scene.threshold),
-    );
-    lines.line(
-        "Z",
-        format!(
-            "{:.4} ({} between particles that are held, {})",
-            o.coordination(),
-            counted(o.backbone_contacts, "contact"),
-            counted(o.rattlers, "rattler")
-        ),
-    );
-    lines.line("pressure", format!("{:.6e} γ/length", o.pressure()));
-    lines.line("energy", format!("{:.6e} γ·length", o.energy));
-    if let Some(law) = run.law() {
-        let residual = law.residual();
-        lines.line(
-            "contact law",
-            format!("residual {residual:.1e} of the largest overlap"),
-        );
-    }
-    let rate = (run.step() - from) as f64 / took.as_secs_f64().max(1e-9);
-    // Without disks it is the time of the first contact problem.
-    let before = run.disks().map_or("start", |_| "disks");
-    lines.line(
-        "time",
-        format!(
-            "{:.2} s {before}, {:.2} s relaxation ({rate:.0} steps/s)",
-            start_took.as_secs_f64(),
-            took.as_secs_f64()
-        ),
-    );
-    for (output, written) in outputs.iter().zip(&summary.files) {
-        lines.line(
-            "file",
-            format!(
-                "{} ({}, {})",
-                output.path.display(),
-                HumanBytes(written.bytes),
-                counted(written.states, "state")
-            ),
-        );
-        lines.line("open it with", open_with(&output.path, output.format));
-    }
-    lines.into_text()
+    let decades = |x: f64| libm::log10(x.max(threshold) / threshold);
+    let (step, f_max, contacts) = (run.step(), run.f_max(), run.contacts().pairs.len());
+    let done = 1.0 - decades(f_max) / decades(1.0).max(1.0);
+    bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
+    let rate = rate(step - from.0, from.1.elapsed());
+    bar.set_message(format!(
+        "step {step}  f_max {f_max:.2e}  contacts {contacts}  {rate:.0} steps/s"
+    ));
+}
+
+/// Steps a second.
+fn rate(steps: u64, took: Duration) -> f64 {
+    steps as f64 / took.as_secs_f64().max(1e-9)
 }

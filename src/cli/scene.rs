@@ -1,7 +1,6 @@
 //! `softjam scene`: prints a scene file.
 
-use super::{Verdict, flags::SceneFlags, print};
-use softjam::scene::SceneError;
+use super::{Verdict, flags::SceneFlags, out_of_range, print};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -18,12 +17,8 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     if let Some(path) = arguments.scene.file_unlike_text() {
-        return Err(SceneError::Range {
-            field: "file".to_owned(),
-            value: path.display().to_string(),
-            allowed: "a name in UTF-8, since a scene file is text; rename the file".to_owned(),
-        }
-        .into());
+        let allowed = "a name in UTF-8, since a scene file is text; rename the file".to_owned();
+        return Err(out_of_range("file", path.display(), allowed));
     }
     print(&arguments.scene.scene()?.to_toml())?;
     Ok(Verdict::Good)

@@ -1,10 +1,8 @@
 //! What a replay that takes long says of itself, on standard error.
 
-use crate::cli::{talks, warn};
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::cli::{bar, warn};
 use softjam::replay::Recording;
 use softjam::text::counted;
-use std::io::IsTerminal as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -33,11 +31,7 @@ impl Progress {
         let limit = recording.scene().steps;
         let thread = std::thread::spawn(move || {
             let start = Instant::now();
-            let bar = (talks() && std::io::stderr().is_terminal()).then(ProgressBar::new_spinner);
-            if let Some(bar) = &bar {
-                let style = ProgressStyle::with_template("{spinner} {msg}");
-                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-            }
+            let bar = bar("{spinner} {msg}");
             let mut wait = LONG;
             while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(wait) {
                 let text = format!(
@@ -46,18 +40,16 @@ impl Progress {
                     seen.load(Ordering::Relaxed),
                     start.elapsed().as_secs()
                 );
-                if let Some(bar) = &bar {
+                if bar.is_hidden() {
+                    warn(&text);
+                    wait = AGAIN;
+                } else {
                     bar.set_message(text);
                     bar.tick();
                     wait = Duration::from_millis(200);
-                } else {
-                    warn(&text);
-                    wait = AGAIN;
                 }
             }
-            if let Some(bar) = bar {
-                bar.finish_and_clear();
-            }
+            bar.finish_and_clear();
         });
         Self {
             towards,

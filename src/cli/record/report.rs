@@ -1,0 +1,70 @@
+//! What a physicist wants to read at the end of a run.
+
+use crate::cli::lines::Lines;
+use crate::cli::output::Output;
+use softjam::analysis::Stability;
+use softjam::protocol::Relaxation;
+use softjam::record::Summary;
+use softjam::scene::{Scene, Start};
+use softjam::text::counted;
+use std::time::Duration;
+
+/// The report on a run that was prepared for so long and made so many steps in such a time.
+pub(super) fn of(
+    outputs: &[Output],
+    scene: &Scene,
+    run: &Relaxation,
+    summary: &Summary,
+    before: Duration,
+    (steps, took): (u64, Duration),
+) -> String {
+    let (packing, found) = (run.packing(), run.observables());
+    let mut lines = Lines::default();
+    let result = match summary.outcome {
+        None => format!("interrupted at step {}", run.step()),
+        Some(end) if end.stability == Some(Stability::Saddle) => {
+            format!("{end} (--minimizer fire+newton goes on from there)")
+        }
+        Some(end) => end.to_string(),
+    };
+    lines.line("result", result);
+    let origin = match &scene.start {
+        Start::File { path, .. } => format!("from {path}"),
+        Start::Random | Start::Hexagonal => format!("seed {}", scene.seed),
+    };
+    let (domain, coverage) = (packing.domain(), packing.coverage());
+    lines.packing(scene, packing.len(), coverage, domain, &origin);
+    if let Some(disks) = run.disks() {
+        let (steps, f_max) = (counted(disks.steps, "step"), disks.f_max);
+        let ending = if disks.converged { "" } else { " (step limit)" };
+        let z = disks.coordination;
+        let disks = format!("{steps} to f_max = {f_max:.2e} γ, Z = {z:.3}{ending}");
+        lines.line("disks", disks);
+    }
+    let (f_max, threshold) = (found.f_max, scene.threshold);
+    lines.line(
+        "f_max",
+        format!("{f_max:.3e} γ (threshold {threshold:.1e} γ)"),
+    );
+    let contacts = counted(found.backbone_contacts, "contact");
+    let (z, rattlers) = (found.coordination(), counted(found.rattlers, "rattler"));
+    let z = format!("{z:.4} ({contacts} between particles that are held, {rattlers})");
+    lines.line("Z", z);
+    lines.line("pressure", format!("{:.6e} γ/length", found.pressure()));
+    lines.line("energy", format!("{:.6e} γ·length", found.energy));
+    if let Some(law) = run.law() {
+        let residual = law.residual();
+        let residual = format!("residual {residual:.1e} of the largest overlap");
+        lines.line("contact law", residual);
+    }
+    // Without disks it is the time of the first contact problem.
+    let preparation = run.disks().map_or("start", |_| "disks");
+    let (rate, before) = (super::rate(steps, took), before.as_secs_f64());
+    let took = took.as_secs_f64();
+    let time = format!("{before:.2} s {preparation}, {took:.2} s relaxation ({rate:.0} steps/s)");
+    lines.line("time", time);
+    for (output, written) in outputs.iter().zip(&summary.files) {
+        output.tell(written, &mut lines);
+    }
+    lines.into_text()
+}
