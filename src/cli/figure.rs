@@ -3,13 +3,13 @@
 use super::lines::Lines;
 use super::memory::MemoryFlag;
 use super::output::{check_absent, check_place, end_when_interrupted};
-use super::{Verdict, report};
+use super::{Verdict, report, state_at};
 use softjam::budget::Budget;
 use softjam::figure::{self, CHART_WIDTH, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
+use softjam::models::Kind;
 use softjam::record::NewFile;
 use softjam::replay::{Event, Recording};
 use softjam::scene::Start;
-use softjam::state::Frame;
 use softjam::text::shown;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 #[expect(clippy::struct_excessive_bools, reason = "a flag is a bool")]
 #[command(after_help = "\
 Examples:
-  softjam figure run.rrd -o packing.svg                   the last state: contours and force chains
+  softjam figure run.rrd -o packing.svg                   the last state: particles and force chains
   softjam figure run.rrd --step 0 --disks -o disks.png    the undeformed disks of step 0
   softjam figure run.rrd --width 86mm -o column.pdf       for one column of a journal
   softjam figure run.rrd --range 0..2 -o same-scale.svg   a colour scale that several figures share
@@ -46,11 +46,12 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value = "last", value_parser = step)]
     step: Step,
 
-    /// Draw the undeformed disks of the step instead of the contours.
+    /// Draw the undeformed disks of the step instead of the contours of droplets.
     #[arg(long)]
     disks: bool,
 
-    /// What the colour of a particle means: pressure (Σf/2πR relative to its mean), deformation (max |ΔR|/R) or nothing.
+    /// What the colour of a particle means: pressure (Σf/2πR relative to its mean), deformation (max |ΔR|/R of a droplet) or
+    /// nothing.
     #[arg(long, value_name = "QUANTITY", default_value = "pressure", value_parser = super::flags::named::<ColorBy>)]
     color: ColorBy,
 
@@ -76,20 +77,12 @@ pub struct Arguments {
     memory: MemoryFlag,
 }
 
-#[derive(Clone, Copy)]
-enum Step {
-    Last,
-    Number(u64),
-}
+/// A recorded step, or the last.
+type Step = Option<u64>;
 
 fn step(text: &str) -> Result<Step, String> {
-    match text {
-        "last" => Ok(Step::Last),
-        number => number
-            .parse()
-            .map(Step::Number)
-            .map_err(|_| "a step is a whole number, or `last`".to_owned()),
-    }
+    let number = (text != "last").then(|| text.parse()).transpose();
+    number.map_err(|_| "a step is a whole number, or `last`".to_owned())
 }
 
 /// Two numbers, ascending, between which `..` or a comma stands.
@@ -143,10 +136,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
         figure::relaxation_in(arguments.width.unwrap_or(CHART_WIDTH), &runs)?
     } else {
         let [path] = arguments.files.as_slice() else {
-            return Err(FigureError::Nothing(
-                "a packing is drawn of one recording; several are for --fmax".to_owned(),
-            )
-            .into());
+            let problem = "a packing is drawn of one recording; several are for --fmax";
+            return Err(FigureError::Nothing(problem.to_owned()).into());
         };
         packing(path, arguments)?
     };
@@ -224,45 +215,39 @@ fn fall(path: &Path, budget: Budget) -> anyhow::Result<(Names, Fall)> {
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let mut recording = Recording::open_within(path, arguments.memory.budget())?;
-    let mut found: Option<Frame> = None;
-    let mut states = 0;
-    for event in recording.by_ref() {
-        if let Event::State(frame) = event? {
-            let at = frame.step;
-            states += 1;
-            if matches!(arguments.step, Step::Number(k) if at > k) {
-                break;
+    let found = state_at(&mut recording, arguments.step)?;
+    let (shown, scene) = (shown(recording.path()), recording.scene());
+    let problem = match (found, arguments.step) {
+        (Some(frame), step) if step.is_none_or(|k| k == frame.step) => {
+            let style = Style {
+                shape: if arguments.disks {
+                    Shape::Disk
+                } else {
+                    Shape::Contour
+                },
+                color: arguments.color,
+                chains: !arguments.no_chains,
+                width: arguments.width.unwrap_or(Style::default().width),
+                range: arguments.range,
+            };
+            if style.color == ColorBy::Deformation && scene.model == Kind::Disks {
+                format!(
+                    "{shown} is of disks, which keep their shape: --color deformation has nothing to show"
+                )
+            } else {
+                let packing = recording.packing(&frame)?;
+                return Ok(figure::packing(&packing, &frame, scene, &style));
             }
-            found = Some(frame);
         }
-    }
-    let shown = shown(recording.path());
-    let frame = match (found, arguments.step) {
-        (None, Step::Number(k)) if states > 0 => Err(format!(
-            "{shown} holds no state of step {k}, nor one before it"
-        )),
-        (None, _) => Err(format!(
-            "{shown} holds no state to draw; record it with --channels state,…"
-        )),
-        (Some(frame), Step::Number(k)) if frame.step != k => Err(format!(
+        (Some(frame), Some(k)) => format!(
             "{shown} holds no state of step {k}; the nearest before it is {}. `softjam convert` with \
              --channels state=every:1 brings it back",
             frame.step
-        )),
-        (Some(frame), _) => Ok(frame),
+        ),
+        (None, Some(k)) if recording.scene().channels.state.is_on() => {
+            format!("{shown} holds no state of step {k}, nor one before it")
+        }
+        _ => format!("{shown} holds no state to draw; record it with --channels state,…"),
     };
-    let frame = frame.map_err(FigureError::Nothing)?;
-    let style = Style {
-        shape: if arguments.disks {
-            Shape::Disk
-        } else {
-            Shape::Contour
-        },
-        color: arguments.color,
-        chains: !arguments.no_chains,
-        width: arguments.width.unwrap_or(Style::default().width),
-        range: arguments.range,
-    };
-    let packing = recording.packing(&frame)?;
-    Ok(figure::packing(&packing, &frame, recording.scene(), &style))
+    Err(FigureError::Nothing(problem).into())
 }

@@ -1,4 +1,4 @@
-//! A packing: particles as filled contours, contacts as force chains.
+//! A packing: particles as filled shapes, contacts as force chains.
 
 use super::legend::{Legend, length};
 use super::shades::{PALE, Shades};
@@ -7,6 +7,7 @@ use super::{INK, font_size, power_of_ten, with_f_max};
 use crate::contacts::{Contacts, FrameContacts};
 use crate::contacts::{largest_force, net_forces};
 use crate::domain::{Domain, Vec2};
+use crate::models::Kind;
 use crate::models::droplet::contour::{ContourStyle, Contours, Placement};
 use crate::scene::Scene;
 use crate::state::Frame;
@@ -25,7 +26,7 @@ use svg::node::element::{ClipPath, Definitions, Group, Path};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// Its contour `ρ_i(θ)`.
+    /// Its contour `ρ_i(θ)`; the disk where the model is one of disks.
     #[default]
     Contour,
     /// The undeformed disk of the same frame.
@@ -43,7 +44,7 @@ pub enum ColorBy {
     /// `p_i = Σ_j f_ij / 2πR_i`, relative to the mean over the particles that have a contact.
     #[default]
     Pressure,
-    /// `max |ΔR_i| / R_i`.
+    /// `max |ΔR_i| / R_i` of droplets; disks, which keep their shape, are all alike.
     Deformation,
     /// Nothing: all alike.
     Nothing,
@@ -111,11 +112,17 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
         placement: Placement::Contacts,
     });
     contours.draw(packing.radii(), &frame.positions, &contacts, line_tension);
-    let coloring = (style.color, style.range);
+    // Disks keep their shape.
+    let (shape, color) = match (scene.model, style.color) {
+        (Kind::MorseWitten, color) => (style.shape, color),
+        (Kind::Disks, ColorBy::Deformation) => (Shape::Disk, ColorBy::Nothing),
+        (Kind::Disks, color) => (Shape::Disk, color),
+    };
+    let coloring = (color, style.range);
     let shades = Shades::of(coloring, packing.radii(), frame, &contacts, &contours);
 
     let thin = hundredths((OUTLINE.0 * radius * sheet.scale).min(OUTLINE.1));
-    let particles = particles(&sheet, (packing, frame), style.shape, &contours, &shades);
+    let particles = particles(&sheet, (packing, frame), shape, &contours, &shades);
     let mut inside = Group::new()
         .set("clip-path", "url(#box)")
         .add(particles.set("stroke-width", thin));
@@ -126,7 +133,12 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
 
     let (x, y, width, height) = sheet.frame();
     let mut legend = Legend::new((x, y + height + 6.0), width, font_size(style.width));
-    let pieces = caption(packing, frame, &contacts, (line_tension, style.shape));
+    let mut pieces = caption(packing, frame, &contacts, line_tension);
+    match (scene.model, shape) {
+        (Kind::Disks, _) => pieces.push("disks".to_owned()),
+        (Kind::MorseWitten, Shape::Disk) => pieces.push("undeformed disks".to_owned()),
+        (Kind::MorseWitten, Shape::Contour) => {}
+    }
     legend.lines(&pieces, ", ", 1.0);
     shades.bar(&mut legend);
     if let Some(chains) = &chains {
@@ -135,8 +147,7 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     if shades.rattlers() > 0 {
         rattlers(shades.rattlers(), thin, &mut legend);
     }
-    let of_the_model =
-        style.shape == Shape::Contour || chains.is_some() || style.color != ColorBy::Nothing;
+    let of_the_model = shape == Shape::Contour || chains.is_some() || color != ColorBy::Nothing;
     let validity = scene.model.validity(&contacts, packing.len(), line_tension);
     if let Some(warning) = validity.and_then(|v| v.warning()).filter(|_| of_the_model) {
         let words: Vec<String> = warning.split(' ').map(str::to_owned).collect();
@@ -302,25 +313,15 @@ impl Chains {
 }
 
 /// What the picture is of.
-fn caption(
-    packing: &Packing,
-    frame: &Frame,
-    contacts: &Contacts<'_>,
-    (line_tension, shape): (f64, Shape),
-) -> Vec<String> {
+fn caption(packing: &Packing, frame: &Frame, contacts: &Contacts<'_>, unit: f64) -> Vec<String> {
     let mut net = vec![Vec2::zeros(); packing.len()];
     net_forces(contacts, &mut net);
-    let largest = largest_force(&net) / line_tension;
-    let mut pieces = vec![
+    vec![
         format!("N = {}", packing.len()),
         format!("φ = {:.3}", packing.coverage()),
         format!("step {}", frame.step),
-        format!("f_max = {} γ", power_of_ten(largest)),
-    ];
-    if shape == Shape::Disk {
-        pieces.push("undeformed disks".to_owned());
-    }
-    pieces
+        format!("f_max = {} γ", power_of_ten(largest_force(&net) / unit)),
+    ]
 }
 
 /// Where the box lies on the sheet.

@@ -36,14 +36,13 @@ const NICE: i32 = 5;
 #[derive(Debug)]
 pub struct Writer {
     queue: Option<SyncSender<Message>>,
-    thread: Option<JoinHandle<Result<Written, Failure>>>,
+    thread: Option<JoinHandle<Result<Written, RecordError>>>,
     /// Snapshots not yet handed over.
     held: Vec<Arc<Snapshot>>,
     patience: Patience,
     /// Whether the first has been handed over.
     begun: bool,
     place: Arc<Place>,
-    path: String,
 }
 
 /// The file that is written, and when it takes its place.
@@ -61,6 +60,21 @@ impl Place {
             return Ok(());
         }
         self.file.publish()
+    }
+
+    /// What keeps a step from being written; `intact` is the last that the file holds in full.
+    fn failure(&self, step: u64, intact: Option<u64>, source: io::Error) -> RecordError {
+        let path = self.file.path().display().to_string();
+        match source.kind() {
+            // It has come there since the recording was begun.
+            io::ErrorKind::AlreadyExists => RecordError::Exists { path },
+            _ => RecordError::Write {
+                path,
+                step,
+                intact,
+                source,
+            },
+        }
     }
 }
 
@@ -81,13 +95,6 @@ pub struct Written {
 enum Message {
     Snapshots(Vec<Arc<Snapshot>>),
     Finish(Option<Outcome>),
-}
-
-#[derive(Debug)]
-struct Failure {
-    step: u64,
-    intact: Option<u64>,
-    source: io::Error,
 }
 
 impl Writer {
@@ -210,7 +217,6 @@ impl Writer {
             patience,
             begun: false,
             place,
-            path: name,
         })
     }
 
@@ -274,28 +280,15 @@ impl Writer {
 
     fn join(&mut self) -> Result<Written, RecordError> {
         self.queue = None;
-        let lost = || Failure {
-            step: 0,
-            intact: None,
-            source: io::Error::other("the recorder has already ended"),
-        };
-        let result = match self.thread.take().map(JoinHandle::join) {
+        match self.thread.take().map(JoinHandle::join) {
             Some(Ok(result)) => result,
             Some(Err(panic)) => std::panic::resume_unwind(panic),
-            None => Err(lost()),
-        };
-        result.map_err(|failure| match failure.source.kind() {
-            // It has come there since the recording was begun.
-            io::ErrorKind::AlreadyExists => RecordError::Exists {
-                path: self.path.clone(),
-            },
-            _ => RecordError::Write {
-                path: self.path.clone(),
-                step: failure.step,
-                intact: failure.intact,
-                source: failure.source,
-            },
-        })
+            None => {
+                Err(self
+                    .place
+                    .failure(0, None, io::Error::other("the recorder has already ended")))
+            }
+        }
     }
 }
 
@@ -331,13 +324,9 @@ fn write<R: Recorder>(
     place: &Place,
     messages: &Receiver<Message>,
     start_recorder: impl FnOnce(File) -> io::Result<R>,
-) -> Result<Written, Failure> {
+) -> Result<Written, RecordError> {
     let mut step = 0;
-    let start = |source| Failure {
-        step: 0,
-        intact: None,
-        source,
-    };
+    let start = |source| place.failure(0, None, source);
     let cut = sink.try_clone().map_err(start)?;
     step_back();
     let mut recorder = start_recorder(sink).map_err(start)?;
@@ -380,10 +369,7 @@ fn write<R: Recorder>(
         .map_err(|source| {
             // A message that reached the disk in part would be a torn end. What is no file cannot be cut, and need not be.
             drop(cut.set_len(recorder.written()));
-            Failure {
-                step,
-                intact: recorder.intact().filter(|_| place.file.is_published()),
-                source,
-            }
+            let intact = recorder.intact().filter(|_| place.file.is_published());
+            place.failure(step, intact, source)
         })
 }

@@ -2,6 +2,7 @@
 
 mod against;
 mod progress;
+mod told;
 mod verdict;
 
 use super::memory::MemoryFlag;
@@ -57,7 +58,7 @@ pub struct Arguments {
 enum Question {
     /// Is the trajectory what the scene gives, bit for bit?
     Determinism,
-    /// Do the frames fulfil the contact law, and does the last one balance?
+    /// Do contacts and forces follow the law of the model in each frame, and does the last one balance?
     Balance,
 }
 
@@ -74,7 +75,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     })?;
     Ok(if !good {
         Verdict::Bad
-    } else if found.standing != Standing::BrokenOff {
+    } else if found.recording.standing() != Standing::BrokenOff {
         Verdict::Good
     } else {
         Verdict::Incomplete
