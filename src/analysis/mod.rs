@@ -26,7 +26,8 @@ mod sums;
 
 pub use frame_forces::FrameForces;
 pub use observables::{METRICS, Metrics, Observables};
-pub use rattlers::{Backbone, backbone, held};
+pub(crate) use rattlers::bearing;
+pub use rattlers::{backbone, held};
 pub use stability::Stability;
 pub(crate) use stability::{Judgement, judge};
 pub(crate) use sums::sum_of_forces;
