@@ -14,7 +14,7 @@ use softjam::contacts::FrameContacts;
 use softjam::models::droplet::validity::{SQUEEZE_LIMIT, Validity};
 use softjam::record::Outcome;
 use softjam::replay::{Event, ReadError, Recording, Standing};
-use softjam::state::Frame;
+use softjam::state::{Frame, Packing};
 use softjam::text::{counted, shown};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,8 +30,8 @@ Examples:
 The status of a recording is one word: converged, step-limit (it ended by its step limit), interrupted (its writer closed it before
 the run had a result) or broken-off (the file was cut, or cut and then mended by another program).
 
-The squeeze of a particle is Σf/2πγ over its contacts, at the last state: beyond 0.0659 the model's own forces are too small
-by more than 10 %.
+The squeeze of a droplet is Σf/2πγ over its contacts, at the last state: beyond 0.0659 the model's own forces are too small
+by more than 10 %. Disks, whose law is meant as it stands, have none.
 
 Exit codes: 0 converged, 1 damaged or not a recording (what comes before the damage is told; others are told all the same), 2 a bad
 flag, 3 not converged: step-limit, interrupted or broken-off")]
@@ -96,10 +96,8 @@ impl Findings {
                     break;
                 }
             };
-            let steps = found
-                .channels
-                .entry(channel.to_owned())
-                .or_insert((0, step, step));
+            let steps = found.channels.entry(channel.to_owned());
+            let steps = steps.or_insert((0, step, step));
             *steps = (steps.0 + 1, steps.1.min(step), steps.2.max(step));
         }
         found
@@ -113,21 +111,22 @@ impl Findings {
         }
     }
 
-    /// Stress of the last state; nothing if it is no state of this packing.
-    fn observables(&self, recording: &Recording) -> Option<Observables> {
+    /// The last state and its packing; nothing if it is no state of this packing.
+    fn state(&self, recording: &Recording) -> Option<(Packing, &Frame)> {
         let last = self.last.as_ref()?;
-        let packing = recording.packing(last).ok()?;
-        let scene = recording.scene();
-        let forces = FrameForces::of(&packing, last, scene.model());
-        Some(*forces.observables())
+        Some((recording.packing(last).ok()?, last))
     }
 
-    /// How far the last state strains the linear model; nothing if it is no state of this packing.
+    /// Stress of the last state.
+    fn observables(&self, recording: &Recording) -> Option<Observables> {
+        let (packing, last) = self.state(recording)?;
+        Some(*FrameForces::of(&packing, last, recording.scene().model()).observables())
+    }
+
+    /// How far the last state strains a linear model.
     fn squeeze(&self, recording: &Recording) -> Option<Validity> {
-        let last = self.last.as_ref()?;
-        let packing = recording.packing(last).ok()?;
-        let contacts = FrameContacts::of(&packing, last);
-        let scene = recording.scene();
+        let (packing, last) = self.state(recording)?;
+        let (scene, contacts) = (recording.scene(), FrameContacts::of(&packing, last));
         (scene.model).validity(&contacts.view(), packing.len(), scene.line_tension)
     }
 }
@@ -229,17 +228,14 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
         lines.line("goes on", goes_on);
     }
     for (channel, (count, first, last)) in &found.channels {
-        let pictures =
-            scene.channels.redraw > 0.0 && ["contours", "contacts"].contains(&&**channel);
-        let where_drawn = if pictures {
+        let pictures = ["contours", "contacts"].contains(&channel.as_str());
+        let drawn = if pictures && scene.channels.redraw > 0.0 {
             ", drawn where they look different"
         } else {
             ""
         };
-        lines.line(
-            channel,
-            format!("{}, {first} … {last}{where_drawn}", counted(count, "step")),
-        );
+        let steps = counted(count, "step");
+        lines.line(channel, format!("{steps}, {first} … {last}{drawn}"));
     }
     if !found.channels.contains_key("state") {
         let none = if scene.channels.state.is_on() && closed {
@@ -271,12 +267,14 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
     }
     for (name, value) in &found.metrics {
         let counts = ["contacts", "rattlers"].contains(name);
-        let value = if counts {
-            format!("{value}")
-        } else {
-            format!("{value:.6e}")
-        };
-        lines.line(name, value);
+        lines.line(
+            name,
+            if counts {
+                value.to_string()
+            } else {
+                format!("{value:.6e}")
+            },
+        );
     }
     lines.into_text()
 }

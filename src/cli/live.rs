@@ -58,11 +58,8 @@ impl LiveFlags {
             let place = viewer.to_string();
             Ok((Live::start(viewer, header.clone())?, place))
         });
-        View(
-            started
-                .map_err(|error| warn(&format!("no live view: {error}")))
-                .ok(),
-        )
+        let tell = |error: &_| warn(&format!("no live view: {error}"));
+        View(started.inspect_err(tell).ok())
     }
 }
 

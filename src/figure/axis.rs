@@ -110,10 +110,8 @@ impl Ruler {
                 .flat_map(|k| (2..=9).map(move |m| k as f64 + libm::log10(f64::from(m))))
                 .collect(),
         };
-        places
-            .into_iter()
-            .map(|at| self.part_of_place(at))
-            .collect()
+        let parts = places.into_iter().map(|at| self.part_of_place(at));
+        parts.collect()
     }
 }
 
@@ -138,12 +136,9 @@ fn linear(least: f64, most: f64) -> Result<(Range<f64>, f64), FigureError> {
         step = step_of(width);
     }
     // An axis that starts at zero starts there.
-    let from = if least == 0.0 {
-        0.0
-    } else {
-        least - 0.04 * width
-    };
-    let to = most + 0.04 * width;
+    let air = 0.04 * width;
+    let from = if least == 0.0 { 0.0 } else { least - air };
+    let to = most + air;
     if !(to - from).is_finite() {
         let problem = format!("{least:e} and {most:e} do not go on one axis");
         return Err(FigureError::Draw(problem));

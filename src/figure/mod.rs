@@ -148,8 +148,7 @@ pub fn write(path: impl AsRef<Path>, svg: &str) -> Result<(), FigureError> {
 /// ```
 pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
     let path = file.path().to_owned();
-    let path = path.as_path();
-    let bytes = match Kind::of(path)? {
+    let bytes = match Kind::of(&path)? {
         Kind::Png => png(svg)?,
         Kind::Pdf => pdf(svg)?,
         Kind::Svg => {
@@ -158,15 +157,11 @@ pub fn write_into(mut file: NewFile, svg: &str) -> Result<(), FigureError> {
         }
     };
     let written = file.write_all(&bytes).and_then(|()| file.publish());
+    let path = path.display().to_string();
     written.map_err(|source| match source.kind() {
         // It has come there since the file was begun.
-        std::io::ErrorKind::AlreadyExists => FigureError::File(RecordError::Exists {
-            path: path.display().to_string(),
-        }),
-        _ => FigureError::Write {
-            path: path.display().to_string(),
-            source,
-        },
+        std::io::ErrorKind::AlreadyExists => RecordError::Exists { path }.into(),
+        _ => FigureError::Write { path, source },
     })
 }
 
@@ -243,19 +238,17 @@ const LONGEST_SIDE: f32 = 12_800.0;
 /// Refuses a figure with places or sizes that are no numbers, or with such a force or squeeze in what stands below it: forces or
 /// lengths beyond what a number can hold.
 fn check_numbers(svg: &str) -> Result<(), FigureError> {
-    let none = |text: &str, around: [&str; 2]| {
-        let [before, behind] = around;
-        ["NaN", "inf"]
-            .iter()
-            .any(|word| text.contains(&[before, word, behind].concat()))
+    let none = |text: &str, [before, behind]: [&str; 2]| {
+        let mut words = ["NaN", "inf"].into_iter();
+        words.any(|word| text.contains(&[before, word, behind].concat()))
     };
-    let mut parts = svg
-        .split('<')
-        .map(|part| part.split_once('>').unwrap_or((part, "")));
     let said = |text: &str| {
         let around = [["= ", " γ"], ["up to ", ","], ["mean ", ","]];
         around.into_iter().any(|around| none(text, around))
     };
+    let mut parts = svg
+        .split('<')
+        .map(|part| part.split_once('>').unwrap_or((part, "")));
     if parts.any(|(tag, text)| none(tag, ["", ""]) || said(text)) {
         let problem = "forces or lengths are beyond what a number can hold".to_owned();
         return Err(FigureError::Draw(problem));

@@ -196,30 +196,29 @@ fn particles(
 ) -> Group {
     let (mut particles, mut outlines) = (Group::new(), Group::new());
     for (p, (&center, &radius)) in frame.positions.iter().zip(packing.radii()).enumerate() {
-        match shape {
-            Shape::Contour => {
-                let outline = contours.polygon(p);
-                for shift in sheet.images(outline) {
-                    let points = outline.iter().map(|v| sheet.place(v + shift));
-                    particles.append(polygon(points).set("fill", shades.fill(p)));
-                }
+        let fill = shades.fill(p);
+        if shape == Shape::Contour {
+            let outline = contours.polygon(p);
+            for shift in sheet.images(outline) {
+                let points = outline.iter().map(|v| sheet.place(v + shift));
+                particles.append(polygon(points).set("fill", fill.as_str()));
             }
-            Shape::Disk => {
-                let corner = Vec2::repeat(radius);
-                for shift in sheet.images(&[center - corner, center + corner]) {
-                    let disk = circle(sheet.place(center + shift), sheet.pixels(radius));
-                    outlines.append(disk.clone());
-                    particles.append(disk.set("fill", shades.fill(p)));
-                }
+        } else {
+            let corner = Vec2::repeat(radius);
+            for shift in sheet.images(&[center - corner, center + corner]) {
+                let disk = circle(sheet.place(center + shift), sheet.pixels(radius));
+                outlines.append(disk.clone());
+                particles.append(disk.set("fill", fill.as_str()));
             }
         }
     }
     let drawn = |group: Group| group.set("stroke", INK).set("stroke-linejoin", "round");
     match shape {
         Shape::Contour => drawn(particles),
-        Shape::Disk => Group::new()
-            .add(particles)
-            .add(drawn(outlines).set("fill", "none")),
+        Shape::Disk => {
+            let outlines = drawn(outlines).set("fill", "none");
+            Group::new().add(particles).add(outlines)
+        }
     }
 }
 

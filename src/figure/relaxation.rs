@@ -52,13 +52,10 @@ pub fn relaxation_in(width: f64, runs: &[Fall]) -> Result<String, FigureError> {
     let steps = runs.iter().flat_map(|run| run.points.iter().map(|p| p.0));
     let nothing = || FigureError::Nothing("there is no f_max to draw".to_owned());
     let last = steps.max().ok_or_else(nothing)?;
+    let place = |&(step, f): &(u64, f64)| (step as f64, f.max(LEAST));
     let curve = |run: &Fall| Curve {
         label: run.label.clone(),
-        points: run
-            .points
-            .iter()
-            .map(|&(step, f)| (step as f64, f.max(LEAST)))
-            .collect(),
+        points: run.points.iter().map(place).collect(),
         ..Curve::default()
     };
     let mut curves: Vec<Curve> = runs.iter().map(curve).collect();
@@ -76,12 +73,11 @@ pub fn relaxation_in(width: f64, runs: &[Fall]) -> Result<String, FigureError> {
         title: title.to_owned(),
         scale,
     };
-    chart_in(
-        width,
-        &axis("step", Scale::Linear),
-        &axis("f_max / γ", Scale::Logarithmic),
-        &curves,
-    )
+    let (steps, falls) = (
+        axis("step", Scale::Linear),
+        axis("f_max / γ", Scale::Logarithmic),
+    );
+    chart_in(width, &steps, &falls, &curves)
 }
 
 #[cfg(test)]

@@ -184,12 +184,9 @@ impl Range {
         }
         // All alike are the colour of the middle.
         let least = 0.2 * high;
-        let (low, high) = if high - low < least {
-            let middle = 0.5 * (low + high);
-            (middle - 0.5 * least, middle + 0.5 * least)
-        } else {
-            (low, high)
-        };
+        let (middle, narrow) = (0.5 * (low + high), high - low < least);
+        let low = if narrow { middle - 0.5 * least } else { low };
+        let high = if narrow { middle + 0.5 * least } else { high };
         let step = super::axis::round_step((high - low) / 5.0);
         let low = (libm::floor(low / step + 1e-9) * step).max(0.0);
         Self::between(low, libm::ceil(high / step - 1e-9) * step, step)
@@ -197,15 +194,10 @@ impl Range {
 
     fn between(low: f64, high: f64, step: f64) -> Self {
         let steps = libm::round((high - low) / step) as usize;
-        Self {
-            low,
-            high,
-            // The last is the end itself, to the last bit.
-            ticks: (0..steps)
-                .map(|k| low + k as f64 * step)
-                .chain([high])
-                .collect(),
-        }
+        // The last is the end itself, to the last bit.
+        let ticks = (0..steps).map(|k| low + k as f64 * step).chain([high]);
+        let ticks = ticks.collect();
+        Self { low, high, ticks }
     }
 }
 

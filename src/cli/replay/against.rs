@@ -21,14 +21,10 @@ pub(super) fn against(here: &Path, there: &Path, arguments: &Arguments) -> anyho
         && a.is_laid_out_by_softjam() == b.is_laid_out_by_softjam()
         && a.is_closed()
         && b.is_closed();
-    let byte = if alike {
-        first_difference(here, there)?
-    } else {
-        None
-    };
+    let byte = alike.then(|| first_difference(here, there)).transpose()?;
     let difference = found.difference.as_ref().map(ToString::to_string);
     let difference = difference.or_else(|| {
-        let at = byte?;
+        let at = byte.flatten()?;
         let place = place_of_byte(here, at).map_or(String::new(), |place| format!(" ({place})"));
         Some(format!("byte {at} of the files{place}"))
     });
@@ -38,18 +34,16 @@ pub(super) fn against(here: &Path, there: &Path, arguments: &Arguments) -> anyho
         None if found.common == 0 => "no step is recorded in both".to_owned(),
         None => "the same to the last bit".to_owned(),
     };
-    let rows = format!(
-        "states at {} and {}",
+    let (states, metrics) = (
         counted(found.common, "common step"),
-        counted(found.metrics, "metric")
+        counted(found.metrics, "metric"),
     );
-    let checked = if alike {
-        format!(
-            "{rows}, and all bytes of the two files. Not checked: whether their scene gives them."
-        )
+    let beyond = if alike {
+        ", and all bytes of the two files. Not checked: whether their scene gives them."
     } else {
-        format!("{rows}. Not checked: pictures, layout and names; whether their scenes give them.")
+        ". Not checked: pictures, layout and names; whether their scenes give them."
     };
+    let checked = format!("states at {states} and {metrics}{beyond}");
     print(&if arguments.json {
         let value = serde_json::json!({
             "here": shown(&here.display().to_string()),
@@ -77,21 +71,14 @@ pub(super) fn against(here: &Path, there: &Path, arguments: &Arguments) -> anyho
 
 /// The first byte that two files do not share, the end of the shorter one included.
 fn first_difference(here: &Path, there: &Path) -> io::Result<Option<u64>> {
-    let mut ours = BufReader::new(File::open(here)?);
-    let mut theirs = BufReader::new(File::open(there)?);
-    let (mut a, mut b, mut at) = (Vec::new(), Vec::new(), 0);
+    let bytes = |path| Ok::<_, io::Error>(BufReader::new(File::open(path)?).bytes());
+    let (mut ours, mut theirs) = (bytes(here)?, bytes(there)?);
+    let mut at = 0;
     loop {
-        a.clear();
-        b.clear();
-        ours.by_ref().take(1 << 16).read_to_end(&mut a)?;
-        theirs.by_ref().take(1 << 16).read_to_end(&mut b)?;
-        if a != b {
-            let same = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
-            return Ok(Some(at + same as u64));
+        match (ours.next().transpose()?, theirs.next().transpose()?) {
+            (None, None) => return Ok(None),
+            (a, b) if a != b => return Ok(Some(at)),
+            _ => at += 1,
         }
-        if a.is_empty() {
-            return Ok(None);
-        }
-        at += a.len() as u64;
     }
 }
