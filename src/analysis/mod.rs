@@ -30,4 +30,3 @@ pub(crate) use rattlers::bearing;
 pub use rattlers::{backbone, held};
 pub use stability::Stability;
 pub(crate) use stability::{Judgement, judge};
-pub(crate) use sums::sum_of_forces;

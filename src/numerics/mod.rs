@@ -3,6 +3,7 @@
 //! See the example of [`threads::with`].
 
 pub(crate) mod simplicial;
+pub(crate) mod sums;
 pub mod threads;
 pub(crate) mod wide;
 

@@ -7,8 +7,8 @@
 
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
-use crate::analysis::sum_of_forces;
 use crate::domain::{Domain, Vec2};
+use crate::numerics::sums::sum_of_forces;
 use crate::numerics::wide::wide;
 use crate::state::Frame;
 

@@ -68,12 +68,13 @@ impl Findings {
             .legs()
             .iter()
             .filter(|_| d.origin == Origin::Scene);
-        let legs: String = legs.map(|leg| {
+        let legs = legs.map(|leg| {
             let (until, threshold) = (leg.until, leg.threshold);
             format!(
                 " (to step {until} with the threshold {threshold:e}, the minimiser and the forces of before)"
             )
-        }).collect();
+        });
+        let legs = legs.collect::<Vec<_>>().concat();
         let (steps, rows) = (counted(d.run, "step"), rows(d));
         let end = recording
             .outcome()

@@ -51,13 +51,13 @@ mod gmres;
 
 mod stiffness;
 
-use crate::analysis::sum_of_forces;
 use crate::domain::Vec2;
 use crate::models::Model;
 use crate::models::droplet::contact::ContactLaw;
 use crate::models::droplet::contact::solver::ConjugateGradient;
 use crate::models::droplet::linear::Linear;
 use crate::models::droplet::{MorseWitten, NetForces};
+use crate::numerics::sums::sum_of_forces;
 use crate::state::Packing;
 pub(crate) use gmres::dot;
 use gmres::{Gmres, Report};
