@@ -143,6 +143,24 @@ fn drawn(phi: f64, style: &Style) -> String {
 }
 
 #[test]
+fn disks_are_drawn_as_circles_which_no_colour_says_are_deformed() {
+    let scene = Scene {
+        particles: 32,
+        model: softjam::models::Kind::Disks,
+        ..Scene::default()
+    };
+    let run = Relaxation::new(&scene).unwrap();
+    let style = Style {
+        color: ColorBy::Deformation,
+        ..Style::default()
+    };
+    let svg = draw(run.packing(), &run.frame(), &scene, &style);
+    // Each is filled and has an outline.
+    assert!(svg.matches("<circle").count() >= 2 * 32);
+    assert!(svg.contains(", disks") && !svg.contains('Δ'));
+}
+
+#[test]
 fn a_packing_beyond_the_range_of_the_model_says_so_where_more_than_positions_is_drawn() {
     let warned = |svg: &str| svg.contains("particles are squeezed beyond the range");
     assert!(!warned(&drawn(0.845, &Style::default())));
