@@ -139,15 +139,20 @@ fn text(header: &Header) -> String {
             }
         ),
     };
-    let (model, particle) = match scene.model {
-        Kind::MorseWitten => ("Morse–Witten model", "deformable particle"),
+    let (model, particle, coverage) = match scene.model {
+        Kind::MorseWitten => (
+            "Morse–Witten model",
+            "deformable particle",
+            ", the coverage of their undeformed disks",
+        ),
         Kind::Disks => (
             "Undeformed disks, f = k δ with k = 4πγ / 3(R_i + R_j)",
             "disk",
+            "",
         ),
     };
     let mut parts = vec![format!(
-        "**{} at φ = {:.4}**, the coverage of their undeformed disks, in a periodic box of \
+        "**{} at φ = {:.4}**{coverage}, in a periodic box of \
          {} × {}. {model}, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
          {}.\n\n",
         counted(packing.len(), particle),

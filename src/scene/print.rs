@@ -123,7 +123,10 @@ impl Scene {
             );
         }
         page.field(
-            "Line tension gamma of the contours, > 0.",
+            match self.model {
+                Kind::MorseWitten => "Line tension gamma of the contours, > 0.",
+                Kind::Disks => "Unit of force gamma, > 0: k = 4 pi gamma / 3 (R_i + R_j).",
+            },
             "line_tension",
             number(self.line_tension),
         );
@@ -199,7 +202,10 @@ impl Scene {
     }
 
     fn write_recording(&self, page: &mut Page) {
-        page.text("\n# Polygons: vertices equally spaced in angle, 3 … 4096; placement \"contacts\" puts one more on each contact,\n# \"equal\" does not (and cuts the cusps off).\n[contours]");
+        page.text(match self.model {
+            Kind::MorseWitten => "\n# Polygons: vertices equally spaced in angle, 3 … 4096; placement \"contacts\" puts one more on each contact,\n# \"equal\" does not (and cuts the cusps off).\n[contours]",
+            Kind::Disks => "\n# Polygons: vertices of a circle, 3 … 4096; placement is of no use to disks.\n[contours]",
+        });
         page.line("vertices", self.contours.vertices);
         page.line("placement", value(&self.contours.placement));
         page.text("\n# When each channel is recorded: \"every K\" steps, \"log K\" steps a decade, or \"off\". The first and the last\n# frame are recorded in any case. Without state a recording cannot be replayed.\n[channels]");
