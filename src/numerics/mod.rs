@@ -1,9 +1,9 @@
-//! What is not physics: a sparse factorisation with one order of sums, loops for wide vectors, a second thread.
+//! What is not physics: a sparse factorisation with one order of sums, sums that no order reaches, loops for wide vectors, a second thread.
 //!
 //! See the example of [`threads::with`].
 
+pub(crate) mod exact_sum;
 pub(crate) mod simplicial;
-pub(crate) mod sums;
 pub mod threads;
 pub(crate) mod wide;
 

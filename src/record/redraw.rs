@@ -8,7 +8,7 @@
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
 use crate::domain::{Domain, Vec2};
-use crate::numerics::sums::sum_of_forces;
+use crate::numerics::exact_sum::sum_of_forces;
 use crate::numerics::wide::wide;
 use crate::state::Frame;
 

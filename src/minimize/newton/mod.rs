@@ -57,7 +57,7 @@ use crate::models::droplet::contact::ContactLaw;
 use crate::models::droplet::contact::solver::ConjugateGradient;
 use crate::models::droplet::linear::Linear;
 use crate::models::droplet::{MorseWitten, NetForces};
-use crate::numerics::sums::sum_of_forces;
+use crate::numerics::exact_sum::sum_of_forces;
 use crate::state::Packing;
 pub(crate) use gmres::dot;
 use gmres::{Gmres, Report};
