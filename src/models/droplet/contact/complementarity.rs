@@ -229,6 +229,7 @@ impl ContactLaw {
         (self.pairs, self.forces) = contacts.into_iter().unzip();
         self.at_rest.clear();
         self.added.clear();
+        self.bulges.forget();
         (self.structured, self.parted) = (false, false);
     }
 
@@ -262,15 +263,22 @@ impl ContactLaw {
 
     /// `B_i`, and a neighbour list that covers the largest of them.
     fn bound_bulges(&mut self, packing: &Packing) {
-        // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
         let widest = WIDEST_BULGE * packing.largest_radius();
-        let loaded = Loaded {
-            packing,
-            geometry: &self.geometry,
-            forces: &self.forces,
-            per_radius: self.per_radius(),
-        };
-        self.diverged = self.bulges.bound(loaded, widest);
+        let per_radius = self.per_radius();
+        let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
+        self.bulges
+            .bound(pairs, forces, packing.radii(), per_radius);
+        // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
+        self.diverged = None;
+        if self.bulges.largest().is_nan() || self.bulges.largest() > widest {
+            let loaded = Loaded {
+                packing,
+                geometry: &self.geometry,
+                forces,
+                per_radius,
+            };
+            self.diverged = self.bulges.cut(widest, |p| loaded.bulge(p));
+        }
         self.cover(packing, self.bulges.largest());
     }
 

@@ -23,7 +23,6 @@ pub(super) struct Loaded<'a> {
 
 impl Loaded<'_> {
     /// A bound of the bulge of particle `p` (length); see [`bulges`](super::bulges).
-    #[inline(always)]
     pub(super) fn bulge(self, p: usize) -> f64 {
         let on = self.geometry.duplicate().contacts(p).iter();
         let bulges = on.map(|&c| most_of(self.forces[c as usize]));

@@ -245,6 +245,7 @@ impl ContactLaw {
             self.pairs.extend_from_slice(pairs);
             self.at_rest.clear();
             self.added.clear();
+            self.bulges.forget();
             (self.structured, self.parted) = (false, false);
         }
         self.forces.clear();
