@@ -15,6 +15,7 @@
     reason = "every run of it is one of droplets, which have a contact law"
 )]
 
+use softjam::analysis::Backbone;
 use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
@@ -326,6 +327,10 @@ fn pictures(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
     let observables = seconds(20, || {
         black_box(run.observables());
     });
+    let mut backbone = Backbone::default();
+    let same_contacts = seconds(20, || {
+        black_box(run.observables_counted(&mut backbone));
+    });
     let fixed = 8 * packing.len() + 16 + scene.to_toml().len();
     Ok(vec![
         row(
@@ -354,6 +359,16 @@ fn pictures(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
             "energy, stress, coordination, rattlers",
             format!("{} a frame", micro(observables)),
             "",
+        ),
+        row(
+            "metrics of a frame with the contacts of the one before",
+            "the search for rattlers",
+            format!(
+                "{} of {} a frame",
+                micro(observables - same_contacts),
+                micro(observables)
+            ),
+            "rattlers_are_counted_again_only_when_contacts_change",
         ),
         row(
             "any recording",

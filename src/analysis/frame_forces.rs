@@ -1,6 +1,6 @@
 //! The forces of a frame that comes from a file, or from anywhere else.
 
-use super::Observables;
+use super::{Backbone, Observables};
 use crate::domain::Vec2;
 use crate::minimize::dt_and_time;
 use crate::models::{AnyModel, Model};
@@ -70,7 +70,7 @@ impl FrameForces {
         Self {
             net: model.net_forces().to_vec(),
             torques: model.torques().to_vec(),
-            observables: Observables::of_model(&model, &packing, dt),
+            observables: Observables::of_model(&model, &packing, dt, &mut Backbone::default()),
         }
     }
 

@@ -26,7 +26,6 @@ mod sums;
 
 pub use frame_forces::FrameForces;
 pub use observables::{METRICS, Metrics, Observables};
-pub(crate) use rattlers::bearing;
-pub use rattlers::{backbone, held};
+pub use rattlers::{Backbone, backbone, held};
 pub use stability::Stability;
 pub(crate) use stability::{Judgement, judge};

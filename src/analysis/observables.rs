@@ -1,9 +1,9 @@
 //! What a frame is worth in numbers: balance, energy, pressure, stress, coordination.
 
-use super::sums::Sums;
-use super::{backbone, bearing};
+use super::{Backbone, sums::Sums};
 use crate::contacts::Contacts;
 use crate::domain::Domain;
+use crate::models::droplet::contact::ContactLaw;
 use crate::models::{AnyModel, Model};
 use crate::state::Packing;
 
@@ -90,27 +90,72 @@ impl Observables {
         line_tension: f64,
         (f_max, dt): (f64, f64),
     ) -> Self {
+        let counter = &mut Backbone::default();
+        Self::counted(
+            contacts,
+            domain,
+            particles,
+            line_tension,
+            (f_max, dt),
+            counter,
+        )
+    }
+
+    /// [`of`](Self::of) with a counter of rattlers that remembers the frame before.
+    ///
+    /// # Panics
+    ///
+    /// If a contact names a particle of index ≥ `particles`.
+    #[must_use]
+    pub fn counted(
+        contacts: &Contacts<'_>,
+        domain: Domain,
+        particles: usize,
+        line_tension: f64,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
         let mut o = Self::summed(contacts, domain, line_tension);
         (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
-        let pairs = bearing(contacts.pairs, contacts.forces);
-        (o.rattlers, o.backbone_contacts) = backbone(particles, &pairs);
+        (o.rattlers, o.backbone_contacts) =
+            backbone.count_touching(particles, contacts, o.contacts);
         o
     }
 
-    /// Observables of what `model` found last, with the time step `dt`.
-    pub(crate) fn of_model(model: &AnyModel, packing: &Packing, dt: f64) -> Self {
+    /// Observables of what `model` found last, with the time step `dt` and a counter of rattlers that remembers the frame before.
+    pub(crate) fn of_model(
+        model: &AnyModel,
+        packing: &Packing,
+        dt: f64,
+        backbone: &mut Backbone,
+    ) -> Self {
         let (domain, particles) = (packing.domain(), packing.len());
         let (gamma, f_max) = (model.line_tension(), model.f_max());
-        let contacts = match model {
-            // The order of the contacts reaches no bit.
-            AnyModel::MorseWitten(droplets) => droplets.law().numbered(),
-            AnyModel::Disks(_) => model.contacts(packing),
+        let AnyModel::MorseWitten(droplets) = model else {
+            let contacts = model.contacts(packing);
+            return Self::counted(&contacts, domain, particles, gamma, (f_max, dt), backbone);
         };
-        let o = Self::of(&contacts, domain, particles, gamma, (f_max, dt));
+        let law = droplets.law();
+        let o = Self::of_law(law, packing, (f_max, dt), backbone);
         if model.torques().is_empty() {
             return o;
         }
-        o.with_torques(&model.contacts(packing), domain, gamma, model.torques())
+        o.with_torques(&law.contacts(), domain, gamma, model.torques())
+    }
+
+    /// [`counted`](Self::counted) with the contacts that `law` found last: the same bits, and the contacts need not be put in
+    /// order for it.
+    pub(crate) fn of_law(
+        law: &ContactLaw,
+        packing: &Packing,
+        (f_max, dt): (f64, f64),
+        backbone: &mut Backbone,
+    ) -> Self {
+        let particles = packing.len();
+        let mut o = Self::summed(&law.numbered(), packing.domain(), law.line_tension());
+        (o.particles, o.f_max, o.dt) = (particles, f_max, dt);
+        (o.rattlers, o.backbone_contacts) = backbone.count_law(particles, law, o.contacts);
+        o
     }
 
     /// What is summed over contacts, in whatever order.

@@ -1,6 +1,6 @@
 //! What the eye gets, whatever the file: colours of the contours, the force network.
 
-use crate::analysis::{bearing, held};
+use crate::analysis::Backbone;
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::state::Frame;
@@ -28,8 +28,8 @@ pub(super) struct Particles {
 }
 
 impl Particles {
-    /// The particles of `radii` in `frame`.
-    pub fn of(radii: &[f64], frame: &Frame) -> Self {
+    /// The particles of `radii` in `frame`; `backbone` remembers the one before.
+    pub fn of(radii: &[f64], frame: &Frame, backbone: &mut Backbone) -> Self {
         let number = radii.len();
         let (mut pressure, mut counts) = (vec![0.0; number], vec![0; number]);
         for (pair, &f) in frame.contacts.iter().zip(&frame.forces) {
@@ -44,7 +44,7 @@ impl Particles {
         let pressed = counts.iter().filter(|n| **n > 0).count().max(1);
         Self {
             mean: pressure.iter().sum::<f64>() / pressed as f64,
-            held: held(number, &bearing(&frame.contacts, &frame.forces)),
+            held: backbone.held(number, &frame.contacts, &frame.forces),
             contacts: counts,
             pressure,
         }

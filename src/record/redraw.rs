@@ -7,6 +7,7 @@
 
 use super::pictures::{Particles, mean};
 use super::{Header, Snapshot};
+use crate::analysis::Backbone;
 use crate::domain::{Domain, Vec2};
 use crate::numerics::exact_sum::sum_of_forces;
 use crate::numerics::wide::wide;
@@ -24,6 +25,7 @@ pub(super) struct Redraw {
     distance: f64,
     /// By how much a pressure or a force may have changed (means).
     share: f64,
+    backbone: Backbone,
     particles: Option<DrawnParticles>,
     contacts: Option<DrawnContacts>,
 }
@@ -51,6 +53,7 @@ impl Redraw {
             radii: packing.radii().to_vec(),
             distance: redraw * mean(packing.radii()),
             share: SHARE * redraw,
+            backbone: Backbone::default(),
             particles: None,
             contacts: None,
         }
@@ -61,7 +64,7 @@ impl Redraw {
         if !snapshot.contours {
             return None;
         }
-        let now = Particles::of(&self.radii, frame);
+        let now = Particles::of(&self.radii, frame, &mut self.backbone);
         let stays = self.particles.as_ref().is_some_and(|before| {
             let most = self.share * now.mean;
             before.held == now.held

@@ -1,6 +1,6 @@
 //! What is recorded of a step, and how snapshots are taken of a run.
 
-use crate::analysis::Metrics;
+use crate::analysis::{Backbone, Metrics};
 use crate::protocol::Relaxation;
 use crate::scene::Channels;
 use crate::state::Frame;
@@ -46,14 +46,21 @@ impl Snapshot {
     /// step of a recording, every channel that is on records.
     #[must_use]
     pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
-        Self::made(run, channels, edge, Frame::default)
+        Self::made(
+            run,
+            channels,
+            edge,
+            &mut Backbone::default(),
+            Frame::default,
+        )
     }
 
-    /// [`of`](Self::of) with `room` for the frame.
+    /// [`of`](Self::of) with a counter of rattlers that remembers the snapshot before, and `room` for the frame.
     fn made(
         run: &Relaxation,
         channels: &Channels,
         edge: bool,
+        backbone: &mut Backbone,
         room: impl FnOnce() -> Frame,
     ) -> Option<Self> {
         let [contours, contacts, metrics, state] = channels.at(run.step(), edge);
@@ -61,7 +68,7 @@ impl Snapshot {
         (pictured || metrics).then(|| Self {
             step: run.step(),
             nanoseconds: nanoseconds(run.time()),
-            metrics: metrics.then(|| run.observables().metrics()),
+            metrics: metrics.then(|| run.observables_counted(backbone).metrics()),
             frame: pictured.then(|| {
                 let mut frame = room();
                 run.copy_frame(&mut frame);
@@ -80,9 +87,11 @@ pub(crate) fn nanoseconds(time: f64) -> i64 {
     (time * 1e9) as i64
 }
 
-/// Takes snapshots of a run, step after step. The memory of those that nobody holds any more serves for the next.
+/// Takes snapshots of a run, step after step. The contacts of the one before tell it who rattles, and the memory of those
+/// that nobody holds any more serves for the next.
 #[derive(Default)]
 pub(crate) struct Snapshots {
+    backbone: Backbone,
     /// Snapshots with a frame that others may still hold.
     out: VecDeque<Arc<Snapshot>>,
     /// Frames that nobody needs.
@@ -97,7 +106,11 @@ impl Snapshots {
         channels: &Channels,
         edge: bool,
     ) -> Option<Arc<Snapshot>> {
-        let Self { out, free } = self;
+        let Self {
+            backbone,
+            out,
+            free,
+        } = self;
         let room = || {
             // Two for each that is taken, so that they do not become more and more behind one that is held for long.
             for snapshot in [out.pop_front(), out.pop_front()].into_iter().flatten() {
@@ -108,7 +121,7 @@ impl Snapshots {
             }
             free.pop().unwrap_or_default()
         };
-        let snapshot = Snapshot::made(run, channels, edge, room).map(Arc::new)?;
+        let snapshot = Snapshot::made(run, channels, edge, backbone, room).map(Arc::new)?;
         if snapshot.frame.is_some() {
             out.push_back(Arc::clone(&snapshot));
         }

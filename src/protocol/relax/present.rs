@@ -2,7 +2,7 @@
 
 use super::Relaxation;
 use super::disks::DiskReport;
-use crate::analysis::Observables;
+use crate::analysis::{Backbone, Observables};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contact::ContactLaw;
@@ -71,7 +71,12 @@ impl Relaxation {
     /// Balance, energy, stress and coordination at this frame.
     #[must_use]
     pub fn observables(&self) -> Observables {
-        Observables::of_model(&self.model, &self.packing, self.mover.dt())
+        self.observables_counted(&mut Backbone::default())
+    }
+
+    /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
+    pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
+        Observables::of_model(&self.model, &self.packing, self.mover.dt(), backbone)
     }
 
     /// The model with its residual.

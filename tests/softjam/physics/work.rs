@@ -1,6 +1,7 @@
 //! What is not needed is not computed: counts of work, not of seconds.
 
 use crate::common::{Folder, assert_at_most, converged, scene};
+use softjam::analysis::Backbone;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Work};
 use softjam::protocol::{Relaxation, Status};
@@ -258,4 +259,39 @@ fn run_that_starts_from_a_file_or_a_frame_relaxes_no_disks() {
         (0, 0),
         "the forces are in the frame"
     );
+}
+
+#[test]
+fn rattlers_are_counted_again_only_when_contacts_change_that_matter() {
+    let mut run = Relaxation::new(&scene(64, 0.86, 1)).expect("a packing");
+    let mut backbone = Backbone::default();
+    let (mut changes, mut last) = (0, None);
+    while run.status() == Status::Running {
+        let contacts = run.contacts();
+        assert!(contacts.forces.iter().all(|f| *f > 0.0));
+        changes += u64::from(last.as_deref() != Some(contacts.pairs));
+        last = Some(contacts.pairs.to_vec());
+        let o = run.observables_counted(&mut backbone);
+        // Independently: rattlers are taken away one at a time, in whatever order.
+        assert_eq!(
+            (o.rattlers, o.backbone_contacts),
+            peeled(o.particles, contacts.pairs)
+        );
+        run.advance().expect("a step");
+    }
+    // Most changes leave what is held as it is.
+    assert!(2 * backbone.counts() < changes, "{}", backbone.counts());
+    assert!(4 * changes < run.step(), "{changes} changes");
+}
+
+/// Rattlers and the contacts left between the others, by the definition.
+fn peeled(particles: usize, pairs: &[[u32; 2]]) -> (usize, usize) {
+    let mut left = pairs.to_vec();
+    let mut alive = vec![true; particles];
+    let of = |left: &[[u32; 2]], k: usize| left.iter().filter(|p| p.contains(&(k as u32))).count();
+    while let Some(k) = (0..particles).rev().find(|&k| alive[k] && of(&left, k) < 3) {
+        alive[k] = false;
+        left.retain(|p| !p.contains(&(k as u32)));
+    }
+    (alive.iter().filter(|a| !**a).count(), left.len())
 }

@@ -418,6 +418,7 @@ impl ContactLaw {
         let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
         for at in 0..count {
             let offence = self.offending[at];
+            self.note(offence.pair(), matches!(offence, Offence::Add(..)));
             match offence {
                 Offence::Drop(contact, _) => {
                     left = left.max(self.geometry.overlaps()[contact].abs());

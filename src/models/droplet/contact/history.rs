@@ -5,7 +5,7 @@ use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry};
 use super::product::Products;
 use super::solver::{ConjugateGradient, Method};
-use crate::analysis::Observables;
+use crate::analysis::{Backbone, Observables};
 use crate::contacts::net_forces;
 use crate::domain::{Domain, Vec2};
 use crate::protocol::Relaxation;
@@ -46,7 +46,7 @@ fn image(matrix: &ContactMatrix) -> Vec<f32> {
 }
 
 /// Everything that can be asked of two laws, and of the matrix made anew.
-fn assert_same(run: &ContactLaw, again: &ContactLaw, packing: &Packing) {
+fn assert_same(run: &ContactLaw, again: &ContactLaw, packing: &Packing, counter: &mut Backbone) {
     let (a, b) = (run.contacts(), again.contacts());
     assert_eq!(a.pairs, b.pairs);
     assert_eq!(bits(a.forces), bits(b.forces));
@@ -66,11 +66,11 @@ fn assert_same(run: &ContactLaw, again: &ContactLaw, packing: &Packing) {
     run.sum_forces(&mut net);
     net_forces(&b, &mut expected);
     assert_eq!(net, expected);
-    let observables = |contacts| {
-        let (domain, tension) = (packing.domain(), run.line_tension());
-        Observables::of(contacts, domain, packing.len(), tension, (0.1, 0.1))
-    };
-    assert_eq!(observables(&run.numbered()), observables(&b));
+    let (domain, tension) = (packing.domain(), run.line_tension());
+    assert_eq!(
+        Observables::of_law(run, packing, (0.1, 0.1), counter),
+        Observables::of(&b, domain, packing.len(), tension, (0.1, 0.1))
+    );
 }
 
 /// A random walk about a packing; returns in how many steps contacts were exchanged, or how it ended.
@@ -88,7 +88,7 @@ fn walk(
     };
     let mut run = law(tension, tolerance);
     run.solve(&packing, &[], &[]).map_err(|e| e.to_string())?;
-    let home = packing.positions().to_vec();
+    let (home, mut counter) = (packing.positions().to_vec(), Backbone::default());
     let mut exchanges = 0;
     for step in 0..steps {
         let (pairs, forces) = (
@@ -106,12 +106,12 @@ fn walk(
         assert_eq!(answer, again.solve_within(&packing, f_max, f64::INFINITY));
         answer.map_err(|e| e.to_string())?;
         exchanges += usize::from(run.contacts().pairs != pairs);
-        assert_same(&run, &again, &packing);
+        assert_same(&run, &again, &packing, &mut counter);
         if step % 5 == 0 {
             let answer = run.tighten(&packing, 0.1 * f_max);
             assert_eq!(answer, again.tighten(&packing, 0.1 * f_max));
             answer.map_err(|e| e.to_string())?;
-            assert_same(&run, &again, &packing);
+            assert_same(&run, &again, &packing, &mut counter);
         }
     }
     Ok(exchanges)
@@ -199,7 +199,7 @@ fn mend_that_adds_many_contacts_leaves_a_law_that_agrees_with_itself() {
     run.solve_again(&after).unwrap();
     again.solve_again(&after).unwrap();
     assert!(run.work().patches > 0 && run.contacts().pairs.len() >= pairs.len() + 3);
-    assert_same(&run, &again, &after);
+    assert_same(&run, &again, &after, &mut Backbone::default());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::error::ContactError;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry, Precision};
 use super::patch::Patch;
-use super::present::Present;
+use super::present::{Present, name_of};
 use super::product::FirstProducts;
 use super::search::Search;
 use super::solver::{LinearSolver, Method};
@@ -77,6 +77,10 @@ pub struct ContactLaw {
     pub(super) at_rest: Vec<u32>,
     /// Contacts that came since the structure was built, in any order.
     pub(super) added: Vec<[u32; 2]>,
+    /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
+    /// and is called now.
+    pub(super) changes: Vec<([u32; 2], bool)>,
+    pub(super) sets: (u64, u64),
     /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
     pub(super) structured: bool,
     pub(super) refreshed: bool,
@@ -170,6 +174,8 @@ impl ContactLaw {
             forces: Vec::new(),
             at_rest: Vec::new(),
             added: Vec::new(),
+            changes: Vec::new(),
+            sets: (0, 0),
             structured: false,
             refreshed: false,
             present: OnceLock::new(),
@@ -247,7 +253,11 @@ impl ContactLaw {
             self.added.clear();
             self.bulges.forget();
             (self.structured, self.parted) = (false, false);
+            let set = name_of(pairs);
+            self.sets = (set, set);
         }
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
         self.forces.clear();
         self.forces.extend_from_slice(forces);
     }
@@ -336,6 +346,8 @@ impl ContactLaw {
         moved: f64,
     ) -> Result<(), ContactError> {
         self.present.take();
+        self.changes.clear();
+        self.sets.0 = self.sets.1;
         self.refreshed = false;
         self.moved += moved;
         self.slack = slack(packing, f_max);
