@@ -1,10 +1,10 @@
 //! Whether a packing in balance is a minimum: where net forces vanish, there may still be a way down.
 //!
-//! Small displacements `u` change the net forces by `−K u`, the contact problem solved inside (`newton/linear.rs`). With the
+//! Small displacements `u` change the net forces by `−K u`, the contact problem solved inside (`linear.rs` of the droplets). With the
 //! gradient form `K` is the Hessian of the stored energy; with the central form it departs from symmetry by O(f). The
 //! packing is stable if no eigenvalue of `K` has a negative real part.
 //!
-//! Displacements are measured by `K̃`, the stiffness of contacts that do not know of each other (`newton/stiffness.rs`). The
+//! Displacements are measured by `K̃`, the stiffness of contacts that do not know of each other (`stiffness.rs` of the minimisers). The
 //! eigenvalues of `K u = λ K̃ u` lie in a band around 1, whatever the number of particles, but for the soft modes below it; as
 //! many are negative as of `K` where that is symmetric (Sylvester's law of inertia), and one is 0 only where one of `K` is. The
 //! lowest is found by Arnoldi's method in the scalar product of `K̃` (Lanczos's where `K` is symmetric; Y. Saad, *Numerical

@@ -54,3 +54,8 @@ impl Check {
         }
     }
 }
+
+/// The larger of two numbers; a NaN is larger than any.
+pub(super) fn worse(m: f64, x: f64) -> f64 {
+    if x > m || x.is_nan() { x } else { m }
+}

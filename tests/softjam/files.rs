@@ -4,7 +4,7 @@ use softjam::protocol::{Relaxation, Status};
 use softjam::record::{
     Format, Header, McapRecorder, Outcome, Recorder, RrdRecorder, Snapshot, Written,
 };
-use softjam::replay::{Event, ReadError, Recording};
+use softjam::replay::{Balance, Determinism, Event, ReadError, Recording, Way, determinism};
 use softjam::scene::Scene;
 use softjam::state::Frame;
 use std::io::{self, Cursor, Write};
@@ -58,6 +58,20 @@ pub fn record_as(format: Format, scene: &Scene, change: impl FnMut(&mut Snapshot
 pub fn open(bytes: &[u8]) -> Result<Recording, ReadError> {
     let length = bytes.len() as u64;
     Recording::read("test", Cursor::new(bytes.to_vec()), length)
+}
+
+/// The verdict on the determinism of a recording, and the balance of its states with their metrics.
+pub fn judged(recording: &mut Recording, way: Way) -> (Determinism, Balance) {
+    let mut balance = Balance::new(recording.scene());
+    let verdict = determinism(recording, way, None, |state| {
+        let metrics = state.metrics.get(&state.frame.step);
+        balance.check(
+            &state.packing,
+            &state.frame,
+            metrics.map_or(&[], Vec::as_slice),
+        );
+    });
+    (verdict.expect("a verdict"), balance)
 }
 
 pub fn states(bytes: &[u8]) -> Vec<Frame> {

@@ -1,7 +1,7 @@
 //! The formats of recordings: what the first was is kept, what the second has more comes back.
 
 use crate::common::Folder;
-use crate::files::{FORMATS, open, record_as, states};
+use crate::files::{FORMATS, judged, open, record_as, states};
 use softjam::convert;
 use softjam::domain::Domain;
 use softjam::models::Kind;
@@ -131,16 +131,8 @@ fn disks_are_recorded_replayed_and_converted_like_droplets() {
         let bytes = record_as(format, &scene, |_| {});
         for way in [Way::Whole, Way::Segments(2)] {
             let mut recording = open(&bytes).expect("a recording");
-            let mut balance = Balance::new(recording.scene());
-            let verdict = determinism(&mut recording, way, None, |state| {
-                let metrics = state.metrics.get(&state.frame.step);
-                balance.check(
-                    &state.packing,
-                    &state.frame,
-                    metrics.map_or(&[], Vec::as_slice),
-                );
-            });
-            assert_eq!(verdict.expect("a verdict").difference, None);
+            let (verdict, balance) = judged(&mut recording, way);
+            assert_eq!(verdict.difference, None);
             assert!(balance.agrees(), "{balance:?}");
             assert!(balance.equation_4.value < 1e-14 && balance.overlap.value == 0.0);
             let end = recording.outcome().expect("a result");

@@ -1,7 +1,7 @@
 //! Replay: a recording proves itself, and nothing that is done to it passes in silence.
 
 use crate::common::fire;
-use crate::files::{open, record_as, states};
+use crate::files::{judged, open, record_as, states};
 use softjam::analysis::METRICS;
 use softjam::minimize::fire::FireState;
 use softjam::minimize::newton::Turns;
@@ -419,16 +419,7 @@ fn golden_recordings_verify() {
         size += std::fs::metadata(&path).expect(name).len();
         for way in WAYS {
             let mut recording = Recording::open(&path).expect(name);
-            let mut balance = Balance::new(recording.scene());
-            let verdict = determinism(&mut recording, way, None, |state| {
-                let metrics = state.metrics.get(&state.frame.step);
-                balance.check(
-                    &state.packing,
-                    &state.frame,
-                    metrics.map_or(&[], Vec::as_slice),
-                );
-            });
-            let verdict = verdict.expect(name);
+            let (verdict, balance) = judged(&mut recording, way);
             assert_eq!(verdict.difference, None, "{name}");
             assert!(balance.agrees(), "{name}: {balance:?}");
             assert_eq!(recording.is_closed(), closed, "{name}");

@@ -4,6 +4,7 @@ use super::Disks;
 use crate::contacts::FrameContacts;
 use crate::domain::Vec2;
 use crate::models::Check;
+use crate::models::check::worse;
 use crate::neighbors::NeighborList;
 use crate::state::{Frame, Packing};
 use core::f64::consts::PI;
@@ -43,11 +44,7 @@ impl Disks {
         for (c, &[i, j]) in contacts.pairs.iter().enumerate() {
             let compliance = (radii[i as usize] + radii[j as usize]) / stiffness_sum;
             let off = (contacts.forces[c] * compliance - contacts.overlaps[c].max(0.0)).abs();
-            residual = if off > residual || off.is_nan() {
-                off
-            } else {
-                residual
-            };
+            residual = worse(residual, off);
         }
         let largest = net
             .iter()

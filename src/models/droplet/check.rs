@@ -9,6 +9,7 @@ use super::form::NetForces;
 use super::kernel::{G_AT_CONTACT, G_MAX, g};
 use crate::contacts::{Contacts, FrameContacts, largest_force};
 use crate::domain::Vec2;
+use crate::models::check::worse;
 use crate::models::{Check, Model};
 use crate::neighbors::NeighborList;
 use crate::state::{Frame, Packing};
@@ -111,9 +112,4 @@ impl<'a> Contours<'a> {
         let reaches = self.pushes.iter().zip(self.packing.radii()).map(reach);
         reaches.fold(0.0, f64::max)
     }
-}
-
-/// The larger of two numbers; a NaN is larger than any.
-fn worse(m: f64, x: f64) -> f64 {
-    if x > m || x.is_nan() { x } else { m }
 }

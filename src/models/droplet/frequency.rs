@@ -5,7 +5,7 @@
 //! mass is 1, so `ω_max² = λ_max(K)`. Beyond `dt = 2/ω_max` semi-implicit Euler is unstable; FIRE survives that, but at
 //! several times the steps. Prestress, turning contacts and the torques of the gradient form are left out: at φ = 0.86, 0.95
 //! and 1.1 the whole linear problem has 1.004, 0.99 and 0.97 times this `ω_max` with central and 1.003, 0.98 and 0.94 times
-//! with gradient forces (N = 48, twenty iterations; a test of `newton/linear.rs`).
+//! with gradient forces (N = 48, twenty iterations; a test of `linear.rs`).
 //!
 //! See the example of [`largest_frequency`].
 

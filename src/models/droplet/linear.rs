@@ -4,7 +4,7 @@
 //! `r`, `dd_c = n·x_c` and `dφ_c = t·x_c / r_c`, the derivative of `A f = δ` is
 //!
 //! ```text
-//! A df = −dd − M dφ                                       (M: see force::turning)
+//! A df = −dd − M dφ                                       (M: see turning.rs)
 //! ```
 //!
 //! and that of the net forces `F = B f` of the central form, `F = B f + Tᵀ τ` of the gradient form,
