@@ -27,7 +27,6 @@ fn walk(scene: &Scene, mut seen: impl FnMut(&Relaxation, Work, bool)) -> Relaxat
             singles: after.singles - before.singles,
             structures: after.structures - before.structures,
             symbolic: after.symbolic - before.symbolic,
-            values: after.values - before.values,
             distances: after.distances - before.distances,
             gaps: after.gaps - before.gaps,
             neighbor_lists: after.neighbor_lists - before.neighbor_lists,
@@ -38,9 +37,9 @@ fn walk(scene: &Scene, mut seen: impl FnMut(&Relaxation, Work, bool)) -> Relaxat
 }
 
 #[test]
-fn entries_in_double_precision_are_made_near_balance_and_kept_where_they_are_needed_again() {
+fn entries_in_double_precision_are_made_near_balance() {
     // Far from balance, where FIRE alone is left to finish, and near the end.
-    let (mut steps, mut made, mut kept) = ([0u64; 3], [0; 3], [0; 3]);
+    let (mut steps, mut made) = ([0u64; 3], [0; 3]);
     walk(&scene(256, 0.86, 2), |run, work, same| {
         let place = match run.f_max() {
             f if f > 1e-3 => 0,
@@ -51,14 +50,12 @@ fn entries_in_double_precision_are_made_near_balance_and_kept_where_they_are_nee
         if same || place == 2 {
             steps[place] += 1;
             made[place] += work.assemblies - work.singles;
-            kept[place] += work.values;
         }
     });
-    println!("made in {made:?} and kept in {kept:?} of {steps:?} steps");
+    println!("made in {made:?} of {steps:?} steps");
     assert!(steps[0] > 50 && steps[1] > 200 && steps[2] > 50);
     assert!(100 * made[0] <= steps[0], "far from balance");
-    assert!(100 * kept[1] <= steps[1], "above round-off");
-    assert!(made[2] >= steps[2] && kept[2] > 0, "near balance");
+    assert!(made[2] >= steps[2], "near balance");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 
 use crate::models::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::numerics::wide::wide;
+use crate::state::Packing;
 
 /// What a force is counted with to spare, in units of the mean force.
 const SPARE: f64 = 0.05;
@@ -146,6 +147,14 @@ impl Bulges {
         self.largest = self.bound.iter().copied().fold(0.0, f64::max);
         self.forget();
         first
+    }
+
+    /// Whether two particles are so near that their bulges might meet.
+    #[inline]
+    pub(super) fn may_touch(&self, packing: &Packing, pair: [u32; 2]) -> bool {
+        let ([i, j], radii) = (pair.map(|p| p as usize), packing.radii());
+        let reach = radii[i] + radii[j] + self.of(i) + self.of(j);
+        packing.separation(i, j).norm_squared() < reach * reach
     }
 
     /// A particle's bound as it is known to be now.

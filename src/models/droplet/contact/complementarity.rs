@@ -46,14 +46,14 @@ const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Offence {
+pub(super) enum Violation {
     /// Contact number `.0` pulls.
     Drop(usize, [u32; 2]),
     /// This pair overlaps and has no force; `.1` is a first guess of it.
     Add([u32; 2], f64),
 }
 
-impl Offence {
+impl Violation {
     pub(super) fn pair(self) -> [u32; 2] {
         match self {
             Self::Drop(_, pair) | Self::Add(pair, _) => pair,
@@ -71,7 +71,7 @@ impl ContactLaw {
         let mut patience = PATIENCE;
         for _ in 0..most {
             self.sweep(packing)?;
-            let count = self.offending.len();
+            let count = self.violations.len();
             if count == 0 {
                 return Ok(());
             }
@@ -97,7 +97,7 @@ impl ContactLaw {
             }
         }
         Err(ContactError::Unsettled {
-            offending: self.offending.len(),
+            offending: self.violations.len(),
             contacts: self.contact_count(),
             sweeps: most,
         })
@@ -119,7 +119,7 @@ impl ContactLaw {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
-            && 64 * self.offending.len() <= self.contact_count()
+            && 64 * self.violations.len() <= self.contact_count()
     }
 
     /// Forces of the present set, and the pairs that offend, in the order of the list.
@@ -142,7 +142,6 @@ impl ContactLaw {
         let tolerance = self.allowed(scale);
         let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
         let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
-        self.matrix.keeps_values = direct || !loosely;
         let in_single = self.precision == Precision::Single;
         if !multiplied && in_single {
             let (geometry, products) = (&self.geometry, &mut self.products);
@@ -257,7 +256,7 @@ impl ContactLaw {
         let scale = self.scale();
         self.bound_bulges(packing);
         let tolerance = self.passed_over(scale);
-        let worst = self.off.max(self.find_offences(packing, tolerance));
+        let worst = self.off.max(self.find_violations(packing, tolerance));
         self.residual = if scale > 0.0 { worst / scale } else { worst };
     }
 
@@ -352,10 +351,10 @@ impl ContactLaw {
         self.parted = true;
     }
 
-    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest offence, below it or above.
-    fn find_offences(&mut self, packing: &Packing, tolerance: f64) -> f64 {
+    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest violation, below it or above.
+    fn find_violations(&mut self, packing: &Packing, tolerance: f64) -> f64 {
         self.part();
-        self.offending.clear();
+        self.violations.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
         let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
@@ -371,8 +370,8 @@ impl ContactLaw {
             }
             for (contact, (&f, &s)) in (64 * k..).zip(rows()) {
                 if pulls(f, s) {
-                    self.offending
-                        .push(Offence::Drop(contact, self.pairs[contact]));
+                    self.violations
+                        .push(Violation::Drop(contact, self.pairs[contact]));
                     worst = worst.max(-f * self.matrix.diagonal()[contact]);
                 }
             }
@@ -398,13 +397,13 @@ impl ContactLaw {
             || other.look_at(at, more.iter().copied().chain(at_rest)),
         );
         for search in &self.searches {
-            self.work.gaps += search.near.len() as u64;
-            self.offending.extend_from_slice(&search.found);
-            worst = worst.max(search.worst);
-            self.tolerated = self.tolerated.max(search.tolerated);
+            self.work.gaps += search.gaps();
+            self.violations.extend_from_slice(search.violations());
+            worst = worst.max(search.worst());
+            self.tolerated = self.tolerated.max(search.tolerated());
         }
-        self.offending
-            .sort_unstable_by_key(|offence| offence.pair());
+        self.violations
+            .sort_unstable_by_key(|violation| violation.pair());
         worst
     }
 
@@ -413,20 +412,24 @@ impl ContactLaw {
     /// A contact that leaves is laid to rest where it is, and one that comes back is woken; others are added behind those
     /// that there are. Neither touches the rest of the structure.
     pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
-        debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
+        debug_assert!(
+            self.violations
+                .windows(2)
+                .all(|w| w[0].pair() < w[1].pair())
+        );
         let mut came: Vec<([u32; 2], f64)> = Vec::new();
         let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
         for at in 0..count {
-            let offence = self.offending[at];
-            self.note(offence.pair(), matches!(offence, Offence::Add(..)));
-            match offence {
-                Offence::Drop(contact, _) => {
+            let violation = self.violations[at];
+            self.note(violation.pair(), matches!(violation, Violation::Add(..)));
+            match violation {
+                Violation::Drop(contact, _) => {
                     left = left.max(self.geometry.overlaps()[contact].abs());
                     self.forces[contact] = 0.0;
                     self.at_rest.push(contact as u32);
                     self.matrix.set_at_rest(contact, true);
                 }
-                Offence::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
+                Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
                     Some(contact) => {
                         joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
                         self.forces[contact as usize] = guess;

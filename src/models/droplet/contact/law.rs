@@ -1,7 +1,7 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 
 use super::bulges::Bulges;
-use super::complementarity::Offence;
+use super::complementarity::Violation;
 use super::error::ContactError;
 use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry, Precision};
@@ -105,7 +105,7 @@ pub struct ContactLaw {
     pub(super) patch: Patch,
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) diverged: Option<(usize, f64)>,
-    pub(super) offending: Vec<Offence>,
+    pub(super) violations: Vec<Violation>,
     /// How far the particles may have moved since the neighbour list was looked at (length).
     pub(super) moved: f64,
     /// The largest `|δ|` of the contacts (length).
@@ -139,8 +139,6 @@ pub struct Work {
     pub singles: u64,
     /// Structures of the contact set (lists, places in `A`) built.
     pub structures: u64,
-    /// Matrices whose entries were kept in double precision; far above round-off their products with the forces are enough.
-    pub values: u64,
     /// Symbolic factorisations; none unless the solver is the sparse Cholesky.
     pub symbolic: u64,
     /// Distances computed of pairs outside the set.
@@ -191,7 +189,7 @@ impl ContactLaw {
             searches: Default::default(),
             patch: Patch::default(),
             diverged: None,
-            offending: Vec::new(),
+            violations: Vec::new(),
             moved: f64::INFINITY,
             scale: 0.0,
             off: 0.0,
@@ -284,7 +282,6 @@ impl ContactLaw {
         Work {
             neighbor_lists: self.neighbors.builds(),
             symbolic: self.solver.symbolic_factorizations(),
-            values: self.matrix.kept,
             ..self.work
         }
     }
@@ -357,7 +354,7 @@ impl ContactLaw {
             Rule::Saitoh => {
                 (self.slack, self.precision) = (0.0, Precision::Double);
                 self.sweep(packing)?;
-                self.exchange(packing, self.offending.len());
+                self.exchange(packing, self.violations.len());
                 self.sweep(packing)?;
             }
         }
@@ -424,7 +421,7 @@ mod tests {
             of(&law.pairs),
             of(&law.forces),
             of(&law.others),
-            of(&law.offending),
+            of(&law.violations),
             of(&law.at_rest),
         ]
     }

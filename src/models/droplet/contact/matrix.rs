@@ -64,8 +64,6 @@ pub struct ContactMatrix {
     pub(super) scale: Vec<f64>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     pub(super) value: Vec<f64>,
-    /// Whether [`refresh`](Self::refresh) keeps them: most steps need no more of them than their products with the forces.
-    pub(super) keeps_values: bool,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
     pub(super) scaled: Vec<f32>,
     /// What entries in single precision are made from, and multiplied with in the first place: see [`sight`](super::sight).
@@ -74,8 +72,6 @@ pub struct ContactMatrix {
     pub(super) units: Units,
     /// Whether the values are not those of the present positions and contacts; an empty matrix lacks none.
     pub(super) lacks_values: bool,
-    /// How often the values were kept.
-    pub(super) kept: u64,
     /// Room for a run, in each of two threads.
     pub(super) rooms: [Room; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.

@@ -15,7 +15,7 @@
 
 use super::blocks::compliance;
 use super::bulges::{WIDER, most_of};
-use super::complementarity::{Offence, WIDEST_BULGE};
+use super::complementarity::{Violation, WIDEST_BULGE};
 use super::geometry::gap_of;
 use super::law::ContactLaw;
 use super::patch::{GONE, NOWHERE, Patch, Whole};
@@ -39,30 +39,30 @@ impl ContactLaw {
             patch.place[c as usize] = GONE;
         }
         let settled = self.mend_in(packing, &mut patch);
-        self.offending.clear();
+        self.violations.clear();
         for &c in &patch.gone {
-            self.offending
-                .push(Offence::Drop(c as usize, self.pairs[c as usize]));
+            self.violations
+                .push(Violation::Drop(c as usize, self.pairs[c as usize]));
         }
         for &c in &self.at_rest {
             if patch.place[c as usize] != GONE {
                 let (pair, force) = (self.pairs[c as usize], self.forces[c as usize]);
-                self.offending.push(Offence::Add(pair, force));
+                self.violations.push(Violation::Add(pair, force));
             }
             patch.place[c as usize] = NOWHERE;
         }
         for (k, pair) in patch.added_pairs().enumerate() {
             if patch.place[known + k] != GONE {
                 let force = self.forces[known + k];
-                self.offending.push(Offence::Add(pair, force));
+                self.violations.push(Violation::Add(pair, force));
             }
         }
-        self.offending
-            .sort_unstable_by_key(|offence| offence.pair());
+        self.violations
+            .sort_unstable_by_key(|violation| violation.pair());
         self.forces.truncate(known);
         patch.finish();
         self.patch = patch;
-        self.exchange(packing, self.offending.len());
+        self.exchange(packing, self.violations.len());
         settled
     }
 
@@ -73,9 +73,9 @@ impl ContactLaw {
         for _ in 0..ROUNDS {
             self.work.patches += 1;
             patch.begin_round();
-            let offending = core::mem::take(&mut self.offending);
-            for offence in &offending {
-                let Some((contact, change)) = self.change(packing, patch, *offence, tolerance)
+            let violations = core::mem::take(&mut self.violations);
+            for violation in &violations {
+                let Some((contact, change)) = self.change(packing, patch, *violation, tolerance)
                 else {
                     continue;
                 };
@@ -93,11 +93,11 @@ impl ContactLaw {
                     return false;
                 }
             }
-            self.offending = offending;
+            self.violations = violations;
             if !self.inspect_round(packing, patch, tolerance) {
                 return false;
             }
-            if self.offending.is_empty() {
+            if self.violations.is_empty() {
                 return true;
             }
         }
@@ -110,11 +110,11 @@ impl ContactLaw {
         &mut self,
         packing: &Packing,
         patch: &mut Patch,
-        offence: Offence,
+        violation: Violation,
         tolerance: f64,
     ) -> Option<(usize, f64)> {
-        match offence {
-            Offence::Drop(contact, _) => {
+        match violation {
+            Violation::Drop(contact, _) => {
                 if self.forces[contact] > 0.0 {
                     return None;
                 }
@@ -125,7 +125,7 @@ impl ContactLaw {
                 let force = core::mem::take(&mut self.forces[contact]);
                 Some((contact, -force))
             }
-            Offence::Add(pair, _) => {
+            Violation::Add(pair, _) => {
                 let guess = self.overlap_force(packing, patch, pair, tolerance)?;
                 let per_radius = self.per_radius();
                 let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
@@ -150,7 +150,7 @@ impl ContactLaw {
     fn inspect_round(&mut self, packing: &Packing, patch: &Patch, tolerance: f64) -> bool {
         let per_radius = self.per_radius();
         let widest = WIDEST_BULGE * packing.largest_radius();
-        self.offending.clear();
+        self.violations.clear();
         let mut largest: f64 = 0.0;
         for &p in &patch.visited {
             let mut bulge = 0.0;
@@ -160,7 +160,7 @@ impl ContactLaw {
                 bulge += most_of(f);
                 if f <= 0.0 && patch.place[contact] != GONE {
                     let pair = patch.pair(whole, contact);
-                    self.offending.push(Offence::Drop(contact, pair));
+                    self.violations.push(Violation::Drop(contact, pair));
                 }
             }
             bulge *= WIDER * packing.radii()[p as usize] * per_radius;
@@ -196,9 +196,9 @@ impl ContactLaw {
             self.inspect_pair(packing, patch, self.pairs[c as usize], tolerance);
         }
         // A contact between two particles that were visited was met twice.
-        self.offending
-            .sort_unstable_by_key(|offence| offence.pair());
-        self.offending.dedup_by_key(|offence| offence.pair());
+        self.violations
+            .sort_unstable_by_key(|violation| violation.pair());
+        self.violations.dedup_by_key(|violation| violation.pair());
         true
     }
 
@@ -208,16 +208,12 @@ impl ContactLaw {
     }
 
     fn inspect_pair(&mut self, packing: &Packing, patch: &Patch, pair: [u32; 2], tolerance: f64) {
-        let [i, j] = pair.map(|p| p as usize);
-        let radii = packing.radii();
-        let separation = packing.separation(i, j);
-        let reach = radii[i] + radii[j] + self.bulges.of(i) + self.bulges.of(j);
         self.work.distances += 1;
-        if separation.norm_squared() >= reach * reach {
+        if !self.bulges.may_touch(packing, pair) {
             return;
         }
         if let Some(guess) = self.overlap_force(packing, patch, pair, tolerance) {
-            self.offending.push(Offence::Add(pair, guess));
+            self.violations.push(Violation::Add(pair, guess));
         }
     }
 

@@ -17,7 +17,6 @@ use core::ops::Range;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Room {
     toward: Vec<Direction>,
-    values: Vec<f64>,
     lanes: Vec<Lanes>,
 }
 
@@ -34,11 +33,10 @@ struct Layout<'a> {
     units: Units,
 }
 
-/// Where the entries of blocks go, the first of all being number `first` of the matrix; the values themselves only where they are
-/// to be kept.
+/// Where the entries of blocks go, the first of all being number `first` of the matrix.
 struct Filled<'a> {
     first: usize,
-    value: Option<&'a mut [f64]>,
+    value: &'a mut [f64],
     scaled: &'a mut [f32],
     room: &'a mut Room,
 }
@@ -60,8 +58,7 @@ impl ContactMatrix {
         products: &mut FirstProducts,
         precision: Precision,
     ) -> f64 {
-        self.lacks_values = precision == Precision::Single || !self.keeps_values;
-        self.kept += u64::from(self.is_complete());
+        self.lacks_values = precision == Precision::Single;
         let n = self.len();
         match (precision, self.is_for_two()) {
             (Precision::Single, false) => {
@@ -100,7 +97,7 @@ impl ContactMatrix {
             #[inline(always)]
             || {
                 self.look(geometry, forces, 0..contacts);
-                self.fill((geometry.directions(), forces), 0..runs, &mut column, false);
+                self.fill((geometry.directions(), forces), 0..runs, &mut column);
             },
         );
         self.lacks_values = true;
@@ -117,10 +114,9 @@ impl ContactMatrix {
         let all = 0..self.runs.len();
         wide(
             #[inline(always)]
-            || self.fill((geometry.directions(), &zeros), all, column, true),
+            || self.fill((geometry.directions(), &zeros), all, column),
         );
         self.lacks_values = false;
-        self.kept += 1;
     }
 
     /// Whether all values are of the present positions and contacts.
@@ -160,7 +156,7 @@ impl ContactMatrix {
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
         mut column: Column<'_>,
     ) -> f64 {
-        let (sorted, keep) = (self.sorted_contacts(), self.keeps_values);
+        let sorted = self.sorted_contacts();
         let in_single = matches!(column, Column::Single(_));
         let stretches = core::mem::take(&mut self.stretches);
         let largest = wide(
@@ -181,11 +177,11 @@ impl ContactMatrix {
                         self.look(geometry, forces, own);
                     }
                     let at = (geometry.directions(), forces);
-                    self.fill(at, runs[0]..runs[1], &mut column, keep);
+                    self.fill(at, runs[0]..runs[1], &mut column);
                 }
                 let all = self.runs.len();
                 let at = (geometry.directions(), forces);
-                self.fill(at, self.sorted..all, &mut column, keep);
+                self.fill(at, self.sorted..all, &mut column);
                 largest
             },
         );
@@ -248,8 +244,7 @@ impl ContactMatrix {
         if matches!(column, Column::Single(_)) {
             self.look_by_two(geometry, forces, half);
         }
-        let keep = self.keeps_values;
-        let (layout, [mut one, mut other]) = self.halves(middle, keep);
+        let (layout, [mut one, mut other]) = self.halves(middle);
         let fill = |runs: Range<usize>, out: &mut Filled<'_>, column: &mut Column<'_>| {
             wide(
                 #[inline(always)]
@@ -274,7 +269,7 @@ impl ContactMatrix {
     }
 
     /// What the blocks are made from, and where they go: those of the first `middle` runs, and the others.
-    fn halves(&mut self, middle: usize, keep: bool) -> (Layout<'_>, [Filled<'_>; 2]) {
+    fn halves(&mut self, middle: usize) -> (Layout<'_>, [Filled<'_>; 2]) {
         let all = self.scaled.len();
         let first = self.runs.get(middle).map_or(all, |run| run.value);
         let layout = Layout {
@@ -288,7 +283,7 @@ impl ContactMatrix {
             units: self.units,
         };
         let (scaled, more_scaled) = self.scaled.split_at_mut(first);
-        let (value, more_values) = keep.then(|| self.value.split_at_mut(first)).unzip();
+        let (value, more_values) = self.value.split_at_mut(first);
         let [room, more_room] = &mut self.rooms;
         let one = Filled {
             first: 0,
@@ -307,15 +302,9 @@ impl ContactMatrix {
 
     /// The values of some runs, scaled and not, and their products with the forces.
     #[inline(always)]
-    fn fill(
-        &mut self,
-        at: (Directions<'_>, &[f64]),
-        runs: Range<usize>,
-        column: &mut Column<'_>,
-        keep: bool,
-    ) {
+    fn fill(&mut self, at: (Directions<'_>, &[f64]), runs: Range<usize>, column: &mut Column<'_>) {
         let all = self.runs.len();
-        let (layout, [mut all, _]) = self.halves(all, keep);
+        let (layout, [mut all, _]) = self.halves(all);
         layout.fill(at, runs, &mut all, column);
     }
 
@@ -393,7 +382,7 @@ impl Layout<'_> {
         out: &mut Filled<'_>,
         products: &mut [f64],
     ) {
-        let Room { toward, values, .. } = &mut *out.room;
+        let toward = &mut out.room.toward;
         for run in &self.runs[runs] {
             let ends = &self.end[run.ends()];
             // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
@@ -404,16 +393,10 @@ impl Layout<'_> {
                 *toward = directions.toward(*end);
             }
             let own = run.values().start - out.first..run.values().end - out.first;
-            if values.len() < own.len() {
-                values.resize(own.len(), 0.0);
-            }
             let blocks = Blocks {
                 toward,
                 ends,
-                values: match &mut out.value {
-                    Some(value) => &mut value[own.clone()],
-                    None => &mut values[..own.len()],
-                },
+                values: &mut out.value[own.clone()],
                 scaled: &mut out.scaled[own],
                 scaling: self.scaling,
                 forces,
