@@ -25,6 +25,7 @@
 use super::error::ContactError;
 use super::images::{Loaded, second_image};
 use super::law::ContactLaw;
+use super::list::ContactList;
 use super::matrix::Precision;
 use super::product::First;
 use super::search::At;
@@ -98,7 +99,7 @@ impl ContactLaw {
         }
         Err(ContactError::Unsettled {
             offending: self.violations.len(),
-            contacts: self.contact_count(),
+            contacts: self.set.active(),
             sweeps: most,
         })
     }
@@ -119,7 +120,7 @@ impl ContactLaw {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
-            && 64 * self.violations.len() <= self.contact_count()
+            && 64 * self.violations.len() <= self.set.active()
     }
 
     /// Forces of the present set, and the pairs that offend, in the order of the list.
@@ -145,11 +146,12 @@ impl ContactLaw {
         let in_single = self.precision == Precision::Single;
         if !multiplied && in_single {
             let (geometry, products) = (&self.geometry, &mut self.products);
-            self.matrix.fill_in_single(geometry, &self.forces, products);
+            self.matrix
+                .fill_in_single(geometry, self.set.forces(), products);
         } else if direct || !multiplied {
             self.matrix.complete(&self.geometry);
         }
-        let (overlaps, forces) = (self.geometry.overlaps(), &mut self.forces[..]);
+        let (overlaps, forces) = (self.geometry.overlaps(), self.set.forces_mut());
         let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
             return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
         };
@@ -177,7 +179,8 @@ impl ContactLaw {
             return Ok(iterations);
         };
         let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
-        solver.finish(matrix, overlaps, &mut self.forces, tolerance, iterations)
+        let forces = self.set.forces_mut();
+        solver.finish(matrix, overlaps, forces, tolerance, iterations)
     }
 
     /// Geometry and matrix of the present set at the present positions; what still stands is not done again. Says whether it was
@@ -187,17 +190,18 @@ impl ContactLaw {
             self.put_in_order(&[]);
         }
         if !self.structured {
-            self.list.rebuild(packing.len(), &self.pairs);
+            let mut list = ContactList::default();
+            list.rebuild(packing.len(), self.set.pairs());
             self.work.structures += 1;
-            self.geometry.restructure(&self.list);
+            self.geometry.restructure(&list);
             let duplicate = self.geometry.duplicate();
             self.matrix
-                .restructure(packing, &self.list, duplicate, self.line_tension);
+                .restructure(packing, &list, duplicate, self.line_tension);
         }
         let anew = !(self.structured && self.refreshed);
         if anew {
             let (geometry, products) = (&mut self.geometry, &mut self.products);
-            let at = (packing, &self.pairs[..], &self.forces[..]);
+            let at = (packing, self.set.pairs(), self.set.forces());
             self.scale = self.matrix.refresh(geometry, at, products, self.precision);
             self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
@@ -208,28 +212,20 @@ impl ContactLaw {
 
     /// Whether so many contacts have left or come since the structure was built that it is time for a new one.
     fn is_untidy(&self) -> bool {
-        16 * self.at_rest.len() > self.pairs.len() + 256
-            || 64 * self.matrix.stragglers() > self.pairs.len() + 1024
+        16 * self.set.inactive().len() > self.set.len() + 256
+            || 64 * self.matrix.stragglers() > self.set.len() + 1024
     }
 
     /// Numbers the contacts in the order of pairs, without those that have left and with those that `came`; their structure
     /// is to be built.
     fn put_in_order(&mut self, came: &[([u32; 2], f64)]) {
-        if came.is_empty() && self.is_in_order() {
+        if came.is_empty() && self.set.is_ordered() {
             return;
         }
-        let numbered = self.pairs.iter().zip(&self.forces);
-        let in_contact = numbered.zip(self.matrix.scaling());
-        let in_contact = in_contact.filter(|(_, scaling)| **scaling > 0.0);
-        let known = in_contact.map(|((pair, force), _)| (*pair, *force));
-        let mut contacts: Vec<_> = known.chain(came.iter().copied()).collect();
-        // Most ascend already.
-        contacts.sort_by_key(|c| c.0);
-        (self.pairs, self.forces) = contacts.into_iter().unzip();
-        self.at_rest.clear();
-        self.added.clear();
+        self.set.sort(came);
+        self.candidates.forget();
         self.bulges.forget();
-        (self.structured, self.parted) = (false, false);
+        self.structured = false;
     }
 
     /// The largest `|δ|`, the scale of all residuals.
@@ -239,9 +235,9 @@ impl ContactLaw {
 
     /// `max |A f − δ|` of the present forces.
     pub(super) fn measure_equation(&mut self) {
-        self.image.resize(self.forces.len(), 0.0);
+        self.image.resize(self.set.len(), 0.0);
         self.matrix.complete(&self.geometry);
-        self.matrix.multiply(&self.forces, &mut self.image);
+        self.matrix.multiply(self.set.forces(), &mut self.image);
         self.off = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
         for ((q, d), s) in rows.zip(self.matrix.scaling()) {
@@ -264,7 +260,7 @@ impl ContactLaw {
     fn bound_bulges(&mut self, packing: &Packing) {
         let widest = WIDEST_BULGE * packing.largest_radius();
         let per_radius = self.per_radius();
-        let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
+        let (pairs, forces) = (self.set.pairs(), self.set.forces());
         self.bulges
             .bound(pairs, forces, packing.radii(), per_radius);
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
@@ -278,20 +274,7 @@ impl ContactLaw {
             };
             self.diverged = self.bulges.cut(widest, |p| loaded.bulge(p));
         }
-        self.cover(packing, self.bulges.largest());
-    }
-
-    /// A neighbour list that covers bulges up to `largest`.
-    pub(super) fn cover(&mut self, packing: &Packing, largest: f64) {
-        let skin = 0.3 * packing.ample_radius();
-        let moved = core::mem::replace(&mut self.moved, 0.0);
-        if self
-            .neighbors
-            .update_after(packing, 2.0 * largest, skin + largest, moved)
-        {
-            self.parted = false;
-        }
-        self.covered = largest;
+        self.candidates.cover(packing, self.bulges.largest());
     }
 
     /// An answer that leaves out a second image of a neighbour, or that bulges without bound, is none.
@@ -302,18 +285,18 @@ impl ContactLaw {
             return Ok(());
         }
         debug_assert!(
-            self.bulges.largest() <= self.covered,
+            self.bulges.largest() <= self.candidates.covered(),
             "pairs in reach are listed"
         );
         let tolerance = ACCEPTED * self.allowed(self.scale());
         let loaded = Loaded {
             packing,
             geometry: &self.geometry,
-            forces: &self.forces,
+            forces: self.set.forces(),
             per_radius: self.per_radius(),
         };
         if let Some((particle, other)) =
-            second_image(loaded, self.neighbors.pairs(), reach, tolerance)
+            second_image(loaded, self.candidates.within_reach(), reach, tolerance)
         {
             return Err(ContactError::BoxTooSmall {
                 particle,
@@ -332,33 +315,18 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// The pairs of the neighbour list that are not in the set.
-    pub(super) fn part(&mut self) {
-        if self.parted {
-            return;
-        }
-        self.others.clear();
-        let in_order = self.pairs.len() - self.added.len();
-        let mut contacts = self.pairs[..in_order].iter().peekable();
-        self.added.sort_unstable();
-        // All ascend.
-        for &pair in self.neighbors.pairs() {
-            while contacts.next_if(|c| **c < pair).is_some() {}
-            if contacts.peek() != Some(&&pair) && self.added.binary_search(&pair).is_err() {
-                self.others.push(pair);
-            }
-        }
-        self.parted = true;
-    }
-
     /// Lists the pairs that offend by more than `tolerance` (length); returns the largest violation, below it or above.
     fn find_violations(&mut self, packing: &Packing, tolerance: f64) -> f64 {
-        self.part();
+        self.candidates.list(&self.set);
         self.violations.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
         let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
-        let rows = self.forces.chunks(64).zip(self.matrix.scaling().chunks(64));
+        let rows = self
+            .set
+            .forces()
+            .chunks(64)
+            .zip(self.matrix.scaling().chunks(64));
         for (k, (forces, scaling)) in rows.enumerate() {
             let rows = || forces.iter().zip(scaling);
             let any = wide(
@@ -371,30 +339,31 @@ impl ContactLaw {
             for (contact, (&f, &s)) in (64 * k..).zip(rows()) {
                 if pulls(f, s) {
                     self.violations
-                        .push(Violation::Drop(contact, self.pairs[contact]));
+                        .push(Violation::Drop(contact, self.set.pairs()[contact]));
                     worst = worst.max(-f * self.matrix.diagonal()[contact]);
                 }
             }
         }
-        self.work.distances += (self.others.len() + self.at_rest.len()) as u64;
+        let candidates = self.candidates.pairs();
+        self.work.distances += (candidates.len() + self.set.inactive().len()) as u64;
         let at = At {
             packing,
             line_tension: self.line_tension,
             geometry: &self.geometry,
-            forces: &self.forces,
+            forces: self.set.forces(),
             bulges: &self.bulges,
             per_radius: self.per_radius(),
             tolerance,
         };
-        let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
+        let inactive = self.set.inactive_pairs();
         let two = self.matrix.is_for_two();
-        let half = if two { self.others.len() / 2 } else { 0 };
-        let (some, more) = self.others.split_at(half);
+        let half = if two { candidates.len() / 2 } else { 0 };
+        let (some, more) = candidates.split_at(half);
         let [one, other] = &mut self.searches;
         both(
             two,
             || one.look_at(at, some.iter().copied()),
-            || other.look_at(at, more.iter().copied().chain(at_rest)),
+            || other.look_at(at, more.iter().copied().chain(inactive)),
         );
         for search in &self.searches {
             self.work.gaps += search.gaps();
@@ -425,15 +394,13 @@ impl ContactLaw {
             match violation {
                 Violation::Drop(contact, _) => {
                     left = left.max(self.geometry.overlaps()[contact].abs());
-                    self.forces[contact] = 0.0;
-                    self.at_rest.push(contact as u32);
+                    self.set.deactivate(contact);
                     self.matrix.set_at_rest(contact, true);
                 }
                 Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
                     Some(contact) => {
                         joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
-                        self.forces[contact as usize] = guess;
-                        self.at_rest.retain(|c| *c != contact);
+                        self.set.activate(contact as usize, guess);
                         self.matrix.set_at_rest(contact as usize, false);
                     }
                     None => came.push((pair, guess)),
@@ -441,17 +408,15 @@ impl ContactLaw {
             }
         }
         if !matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            || 32 * came.len() > self.pairs.len()
+            || 32 * came.len() > self.set.len()
         {
             self.put_in_order(&came);
             return;
         }
         for &(pair, guess) in &came {
-            self.pairs.push(pair);
-            self.forces.push(guess);
-            self.added.push(pair);
+            self.set.add(pair, guess);
             self.geometry.add(packing, pair);
-            joined = joined.max(self.geometry.overlaps()[self.pairs.len() - 1].abs());
+            joined = joined.max(self.geometry.overlaps()[self.set.len() - 1].abs());
             let duplicate = self.geometry.duplicate();
             self.matrix.add(packing, duplicate, pair, self.line_tension);
         }
@@ -460,16 +425,9 @@ impl ContactLaw {
             self.scale = self.matrix.largest_overlap(&self.geometry, all);
         }
         self.scale = self.scale.max(joined);
-        if self.is_in_order() {
+        if self.set.is_ordered() {
             self.matrix.make_whole();
         }
-        // Both ascend.
-        let mut came = came.iter().map(|c| c.0).peekable();
-        if came.peek().is_some() {
-            self.others.retain(|pair| {
-                while came.next_if(|c| c < pair).is_some() {}
-                came.peek() != Some(pair)
-            });
-        }
+        self.candidates.remove(came.iter().map(|c| c.0));
     }
 }

@@ -1,17 +1,17 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 
 use super::bulges::Bulges;
+use super::candidates::Candidates;
 use super::complementarity::Violation;
 use super::error::ContactError;
-use super::list::ContactList;
 use super::matrix::{ContactMatrix, Geometry, Precision};
 use super::patch::Patch;
 use super::present::{Present, name_of};
 use super::product::FirstProducts;
 use super::search::Search;
+use super::set::ContactSet;
 use super::solver::{LinearSolver, Method};
 use super::tolerance::{ACCEPTED, relative_tolerance, slack};
-use crate::neighbors::NeighborList;
 use crate::state::Packing;
 use core::f64::consts::PI;
 use std::sync::OnceLock;
@@ -64,31 +64,19 @@ pub struct ContactLaw {
     pub(super) line_tension: f64,
     pub(super) tolerance: f64,
     pub(super) solver: LinearSolver,
-    pub(super) neighbors: NeighborList,
-    pub(super) list: ContactList,
     pub(super) geometry: Geometry,
     pub(super) matrix: ContactMatrix,
-    /// The contacts by number: ascending when the structure is built, then those that came since, in the order in which they
-    /// came. Which numbers they have reaches no bit of a result.
-    pub(super) pairs: Vec<[u32; 2]>,
-    /// Their forces; 0 for contacts at rest.
-    pub(super) forces: Vec<f64>,
-    /// The numbers of the contacts that have left since the structure was built: they are at rest.
-    pub(super) at_rest: Vec<u32>,
-    /// Contacts that came since the structure was built, in any order.
-    pub(super) added: Vec<[u32; 2]>,
-    /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
-    /// and is called now.
+    pub(super) set: ContactSet,
+    /// What came (`true`) and went in the last solution, one after the other.
     pub(super) changes: Vec<([u32; 2], bool)>,
+    /// The names of the set of contacts before the last solution and now.
     pub(super) sets: (u64, u64),
-    /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
+    /// Whether geometry and matrix have the structure of the set, and whether their values are those of the positions.
     pub(super) structured: bool,
     pub(super) refreshed: bool,
     /// The contacts in their order, if somebody asked for them.
     pub(super) present: OnceLock<Present>,
-    /// The neighbour list without `pairs`, and whether it is up to date.
-    pub(super) others: Vec<[u32; 2]>,
-    pub(super) parted: bool,
+    pub(super) candidates: Candidates,
     /// What the first residual of this solution is computed in.
     pub(super) precision: Precision,
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
@@ -96,8 +84,6 @@ pub struct ContactLaw {
     pub(super) image: Vec<f64>,
     pub(super) products: FirstProducts,
     pub(super) bulges: Bulges,
-    /// The largest bulge that the neighbour list is known to cover at the present positions.
-    pub(super) covered: f64,
     /// The largest overlap of contours outside the set that the tolerance lets pass (length).
     pub(super) tolerated: f64,
     /// Searches for pairs that touch, in each of two threads.
@@ -106,8 +92,6 @@ pub struct ContactLaw {
     /// Particles whose bulge is beyond all reason, the first of them.
     pub(super) diverged: Option<(usize, f64)>,
     pub(super) violations: Vec<Violation>,
-    /// How far the particles may have moved since the neighbour list was looked at (length).
-    pub(super) moved: f64,
     /// The largest `|δ|` of the contacts (length).
     pub(super) scale: f64,
     /// The largest `|A f − δ|` (length).
@@ -164,33 +148,25 @@ impl ContactLaw {
             line_tension,
             tolerance,
             solver: LinearSolver::new(method),
-            neighbors: NeighborList::new(),
-            list: ContactList::default(),
             geometry: Geometry::default(),
             matrix: ContactMatrix::default(),
-            pairs: Vec::new(),
-            forces: Vec::new(),
-            at_rest: Vec::new(),
-            added: Vec::new(),
+            set: ContactSet::default(),
             changes: Vec::new(),
             sets: (0, 0),
             structured: false,
             refreshed: false,
             present: OnceLock::new(),
-            others: Vec::new(),
-            parted: false,
+            candidates: Candidates::default(),
             precision: Precision::Double,
             slack: 0.0,
             image: Vec::new(),
             products: FirstProducts::default(),
             bulges: Bulges::default(),
-            covered: 0.0,
             tolerated: 0.0,
             searches: Default::default(),
             patch: Patch::default(),
             diverged: None,
             violations: Vec::new(),
-            moved: f64::INFINITY,
             scale: 0.0,
             off: 0.0,
             residual: 0.0,
@@ -236,7 +212,8 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
-        (self.refreshed, self.moved) = (false, f64::INFINITY);
+        self.refreshed = false;
+        self.candidates.move_by(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
@@ -244,20 +221,18 @@ impl ContactLaw {
 
     fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.present.take();
-        if !self.is_in_order() || self.pairs != pairs || !self.neighbors.is_of(packing) {
-            self.pairs.clear();
-            self.pairs.extend_from_slice(pairs);
-            self.at_rest.clear();
-            self.added.clear();
+        let known = self.set.is_ordered() && self.set.pairs() == pairs;
+        if !known || !self.candidates.is_of(packing) {
+            self.set.replace(pairs);
+            self.candidates.forget();
             self.bulges.forget();
-            (self.structured, self.parted) = (false, false);
+            self.structured = false;
             let set = name_of(pairs);
             self.sets = (set, set);
         }
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.forces.clear();
-        self.forces.extend_from_slice(forces);
+        self.set.replace_forces(forces);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
@@ -280,7 +255,7 @@ impl ContactLaw {
     #[must_use]
     pub fn work(&self) -> Work {
         Work {
-            neighbor_lists: self.neighbors.builds(),
+            neighbor_lists: self.candidates.builds(),
             symbolic: self.solver.symbolic_factorizations(),
             ..self.work
         }
@@ -327,7 +302,7 @@ impl ContactLaw {
     /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
     /// ```
     pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
-        if !self.neighbors.is_of(packing) {
+        if !self.candidates.is_of(packing) {
             // Other particles: contacts of the ones before mean nothing.
             self.take(packing, &[], &[]);
         }
@@ -346,7 +321,7 @@ impl ContactLaw {
         self.changes.clear();
         self.sets.0 = self.sets.1;
         self.refreshed = false;
-        self.moved += moved;
+        self.candidates.move_by(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {
@@ -414,15 +389,15 @@ mod tests {
 
     /// Where each buffer is, and how long it may get without moving.
     fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
-        fn of<T>(v: &Vec<T>) -> (usize, usize) {
-            (v.as_ptr() as usize, v.capacity())
+        fn of<T>(v: &[T]) -> (usize, usize) {
+            (v.as_ptr() as usize, v.len())
         }
         [
-            of(&law.pairs),
-            of(&law.forces),
-            of(&law.others),
+            of(law.set.pairs()),
+            of(law.set.forces()),
+            of(law.candidates.pairs()),
             of(&law.violations),
-            of(&law.at_rest),
+            of(law.set.inactive()),
         ]
     }
 

@@ -30,36 +30,37 @@ impl ContactLaw {
     /// If not, the contacts are exchanged all the same, with forces to go on from.
     pub(super) fn mend(&mut self, packing: &Packing) -> bool {
         let mut patch = core::mem::take(&mut self.patch);
-        let known = self.pairs.len();
+        let known = self.set.len();
         patch.place.resize(known, NOWHERE);
         patch.left_of.resize(known, 0.0);
         patch.block.resize(packing.len(), NOWHERE);
         patch.is_visited.resize(packing.len(), false);
-        for &c in &self.at_rest {
+        for &c in self.set.inactive() {
             patch.place[c as usize] = GONE;
         }
+        patch.forces = self.set.lend_forces();
         let settled = self.mend_in(packing, &mut patch);
         self.violations.clear();
         for &c in &patch.gone {
             self.violations
-                .push(Violation::Drop(c as usize, self.pairs[c as usize]));
+                .push(Violation::Drop(c as usize, self.set.pairs()[c as usize]));
         }
-        for &c in &self.at_rest {
+        for &c in self.set.inactive() {
             if patch.place[c as usize] != GONE {
-                let (pair, force) = (self.pairs[c as usize], self.forces[c as usize]);
+                let (pair, force) = (self.set.pairs()[c as usize], patch.forces[c as usize]);
                 self.violations.push(Violation::Add(pair, force));
             }
             patch.place[c as usize] = NOWHERE;
         }
         for (k, pair) in patch.added_pairs().enumerate() {
             if patch.place[known + k] != GONE {
-                let force = self.forces[known + k];
+                let force = patch.forces[known + k];
                 self.violations.push(Violation::Add(pair, force));
             }
         }
         self.violations
             .sort_unstable_by_key(|violation| violation.pair());
-        self.forces.truncate(known);
+        self.set.return_forces(core::mem::take(&mut patch.forces));
         patch.finish();
         self.patch = patch;
         self.exchange(packing, self.violations.len());
@@ -80,10 +81,10 @@ impl ContactLaw {
                     continue;
                 };
                 patch.clear();
-                let most = self.contact_count() / 4;
-                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+                let most = self.set.active() / 4;
+                let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
                 patch.disturb(whole, contact, change);
-                let descent = patch.descend(whole, &mut self.forces, 0.5 * allowed, most);
+                let descent = patch.descend(whole, 0.5 * allowed, most);
                 let Some((iterations, left)) = descent else {
                     return false;
                 };
@@ -115,20 +116,20 @@ impl ContactLaw {
     ) -> Option<(usize, f64)> {
         match violation {
             Violation::Drop(contact, _) => {
-                if self.forces[contact] > 0.0 {
+                if patch.forces[contact] > 0.0 {
                     return None;
                 }
                 patch.place[contact] = GONE;
-                if contact < self.pairs.len() && !self.is_at_rest(contact) {
+                if contact < self.set.len() && self.set.is_active(contact) {
                     patch.gone.push(contact as u32);
                 }
-                let force = core::mem::take(&mut self.forces[contact]);
+                let force = core::mem::take(&mut patch.forces[contact]);
                 Some((contact, -force))
             }
             Violation::Add(pair, _) => {
                 let guess = self.overlap_force(packing, patch, pair, tolerance)?;
                 let per_radius = self.per_radius();
-                let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+                let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
                 let contact = if let Some(contact) = patch.find(whole, pair) {
                     patch.gone.retain(|&c| c as usize != contact);
                     patch.place[contact] = NOWHERE;
@@ -137,10 +138,10 @@ impl ContactLaw {
                     let [i, j] = pair.map(|p| p as usize);
                     let (normal, _) = unit_and_length(packing.separation(i, j));
                     patch.add(pair, Direction::of(-normal));
-                    self.forces.push(0.0);
-                    self.forces.len() - 1
+                    patch.forces.push(0.0);
+                    patch.forces.len() - 1
                 };
-                self.forces[contact] = guess;
+                patch.forces[contact] = guess;
                 Some((contact, guess))
             }
         }
@@ -154,9 +155,9 @@ impl ContactLaw {
         let mut largest: f64 = 0.0;
         for &p in &patch.visited {
             let mut bulge = 0.0;
-            let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+            let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
             for (contact, _) in patch.contacts_of(whole, p) {
-                let f = self.forces[contact];
+                let f = patch.forces[contact];
                 bulge += most_of(f);
                 if f <= 0.0 && patch.place[contact] != GONE {
                     let pair = patch.pair(whole, contact);
@@ -170,41 +171,36 @@ impl ContactLaw {
             self.bulges.widen(p as usize, bulge);
             largest = largest.max(bulge);
         }
-        if largest > self.covered {
-            self.cover(packing, largest);
-            self.part();
+        if largest > self.candidates.covered() {
+            self.candidates.cover(packing, largest);
+            self.candidates.list(&self.set);
         }
-        let known = self.pairs.len();
+        let known = self.set.len();
         let is_near = |pair: [u32; 2]| pair.iter().any(|p| patch.is_visited[*p as usize]);
-        let others = core::mem::take(&mut self.others);
-        for pair in others.iter().copied().filter(|pair| is_near(*pair)) {
+        let candidates = core::mem::take(&mut self.candidates);
+        let near = candidates.pairs().iter().filter(|pair| is_near(**pair));
+        for &pair in near {
             let came = patch.find_added(pair);
             if came.is_none_or(|k| patch.place[known + k] == GONE) {
                 self.inspect_pair(packing, patch, pair, tolerance);
             }
         }
-        self.others = others;
-        let at_rest = core::mem::take(&mut self.at_rest);
-        for &c in &at_rest {
-            let pair = self.pairs[c as usize];
+        self.candidates = candidates;
+        for k in 0..self.set.inactive().len() {
+            let c = self.set.inactive()[k];
+            let pair = self.set.pairs()[c as usize];
             if patch.place[c as usize] == GONE && is_near(pair) {
                 self.inspect_pair(packing, patch, pair, tolerance);
             }
         }
-        self.at_rest = at_rest;
         for &c in &patch.gone {
-            self.inspect_pair(packing, patch, self.pairs[c as usize], tolerance);
+            self.inspect_pair(packing, patch, self.set.pairs()[c as usize], tolerance);
         }
         // A contact between two particles that were visited was met twice.
         self.violations
             .sort_unstable_by_key(|violation| violation.pair());
         self.violations.dedup_by_key(|violation| violation.pair());
         true
-    }
-
-    /// Whether contact `c` was at rest before the exchanges that are being mended.
-    fn is_at_rest(&self, c: usize) -> bool {
-        self.matrix.scaling()[c] == 0.0
     }
 
     fn inspect_pair(&mut self, packing: &Packing, patch: &Patch, pair: [u32; 2], tolerance: f64) {
@@ -227,9 +223,9 @@ impl ContactLaw {
     ) -> Option<f64> {
         let [i, j] = pair.map(|p| p as usize);
         let per_radius = self.per_radius();
-        let whole = Whole::of(packing, &self.geometry, &self.pairs, per_radius);
+        let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
         self.work.gaps += 1;
-        let forces = &self.forces;
+        let forces = &patch.forces;
         let gap = gap_of(packing, self.line_tension, [i, j], |p| {
             let contacts = patch.contacts_of(whole, p as u32);
             contacts.map(|(contact, toward)| (forces[contact], toward))

@@ -22,6 +22,7 @@
 
 mod blocks;
 mod bulges;
+mod candidates;
 pub mod complementarity;
 mod error;
 mod fill;
@@ -38,6 +39,7 @@ mod present;
 pub(crate) mod product;
 mod refresh;
 mod search;
+mod set;
 mod sight;
 pub mod solver;
 mod tolerance;

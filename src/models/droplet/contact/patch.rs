@@ -34,6 +34,8 @@ impl Added {
 /// follow behind.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Patch {
+    /// The forces of all contacts with the exchanges that were made.
+    pub(super) forces: Vec<f64>,
     /// Where each contact is in the patch, or one of the marks.
     pub(super) place: Vec<u32>,
     /// The contacts that have left.
@@ -309,12 +311,11 @@ impl Patch {
         }
     }
 
-    /// Adds the correction to `forces`; returns the iterations and the largest residual left. Does nothing if the patch
+    /// Adds the correction to the forces; returns the iterations and the largest residual left. Does nothing if the patch
     /// outgrows `most` contacts or the iterations do not end.
     pub(super) fn descend(
         &mut self,
         whole: Whole<'_>,
-        forces: &mut [f64],
         tolerance: f64,
         most: usize,
     ) -> Option<(usize, f64)> {
@@ -328,7 +329,7 @@ impl Patch {
             // A NaN hides from the largest entry, but not from the sum.
             if largest <= tolerance && f64::is_finite(rz) {
                 for (row, &c) in self.rows.iter().zip(&self.contacts) {
-                    forces[c as usize] += row.correction;
+                    self.forces[c as usize] += row.correction;
                 }
                 return Some((iteration, largest));
             }
