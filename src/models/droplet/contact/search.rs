@@ -3,15 +3,15 @@
 //! - A pair is passed over only if the bounds of its bulges cannot bridge its distance.
 //! - A gap has the bits of [`gap_of`]; which pairs are looked at together changes none.
 
-use super::blocks::compliance;
 use super::bulges::Bulges;
-use super::complementarity::Violation;
 use super::geometry::{Geometry, gap_of};
+use super::law::Violation;
+use super::matrix::compliance;
 use crate::state::Packing;
 
 /// Where and under which forces pairs are looked at.
 #[derive(Clone, Copy)]
-pub(super) struct At<'a> {
+pub(super) struct Conditions<'a> {
     pub(super) packing: &'a Packing,
     pub(super) line_tension: f64,
     pub(super) geometry: &'a Geometry,
@@ -34,7 +34,7 @@ pub(super) struct Search {
 
 impl Search {
     /// Looks at `pairs`, none of which is in contact.
-    pub(super) fn look_at(&mut self, at: At<'_>, pairs: impl Iterator<Item = [u32; 2]>) {
+    pub(super) fn look_at(&mut self, at: Conditions<'_>, pairs: impl Iterator<Item = [u32; 2]>) {
         self.violations.clear();
         (self.worst, self.tolerated, self.gaps) = (0.0, 0.0, 0);
         let radii = at.packing.radii();

@@ -1,12 +1,12 @@
 //! The entries of [`ContactMatrix`] at new positions, and its products, by one thread or by two.
 
 use super::blocks::Run;
-use super::fill::{Blocks, fill, fill_blocks};
-use super::geometry::{Directions, Geometry, Part};
-use super::matrix::{ContactMatrix, Precision, Units};
+use super::entries_f32::{BlocksF32, Lanes, Operand, fill_f32, fill_f32_blocks};
+use super::entries_f64::{Blocks, fill, fill_blocks};
 use super::product::{FirstProducts, Number, Products};
-use super::sight::{Lanes, Sight, SingleBlocks, fill_single, fill_single_blocks};
+use super::{ContactMatrix, Precision, Units};
 use crate::domain::Vec2;
+use crate::models::droplet::contact::geometry::{Directions, Geometry, Part};
 use crate::models::droplet::kernel::Direction;
 use crate::numerics::threads::{are_two_for, both};
 use crate::numerics::wide::wide;
@@ -15,7 +15,7 @@ use core::ops::Range;
 
 /// Room for what is computed of a run and not kept.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Room {
+pub(super) struct Scratch {
     toward: Vec<Direction>,
     lanes: Vec<Lanes>,
 }
@@ -28,7 +28,7 @@ struct Layout<'a> {
     end: &'a [u32],
     scale: &'a [f64],
     scaling: &'a [f64],
-    sights: &'a [Sight],
+    operands: &'a [Operand],
     loads: &'a [f32],
     units: Units,
 }
@@ -38,7 +38,7 @@ struct Filled<'a> {
     first: usize,
     value: &'a mut [f64],
     scaled: &'a mut [f32],
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 /// The precision that entries are computed in, and the column for their products with the forces.
@@ -51,7 +51,7 @@ impl ContactMatrix {
     /// Directions and scaled values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
     /// [`products_into`](Self::products_into) has it; entries and products in this `precision`. The pairs are the contacts by number,
     /// those of `geometry`. Returns the largest `|δ|` (length).
-    pub(crate) fn refresh(
+    pub(crate) fn assemble(
         &mut self,
         geometry: &mut Geometry,
         at: (&Packing, &[[u32; 2]], &[f64]),
@@ -63,21 +63,21 @@ impl ContactMatrix {
         match (precision, self.is_for_two()) {
             (Precision::Single, false) => {
                 let column = Column::Single(products.single.alone(n));
-                self.refresh_by_one(geometry, at, column)
+                self.assemble_by_one(geometry, at, column)
             }
             (Precision::Double, false) => {
                 let column = Column::Double(products.double.alone(n));
-                self.refresh_by_one(geometry, at, column)
+                self.assemble_by_one(geometry, at, column)
             }
             (Precision::Single, true) => {
                 let columns = products.single.both(n).map(Column::Single);
-                let largest = self.refresh_by_two(geometry, at, columns);
+                let largest = self.assemble_by_two(geometry, at, columns);
                 products.single.add_up();
                 largest
             }
             (Precision::Double, true) => {
                 let columns = products.double.both(n).map(Column::Double);
-                let largest = self.refresh_by_two(geometry, at, columns);
+                let largest = self.assemble_by_two(geometry, at, columns);
                 products.double.add_up();
                 largest
             }
@@ -85,7 +85,7 @@ impl ContactMatrix {
     }
 
     /// The entries in single precision of the directions of `geometry`, and their products with `forces`.
-    pub(crate) fn fill_in_single(
+    pub(crate) fn assemble_f32(
         &mut self,
         geometry: &Geometry,
         forces: &[f64],
@@ -96,7 +96,7 @@ impl ContactMatrix {
         wide(
             #[inline(always)]
             || {
-                self.look(geometry, forces, 0..contacts);
+                self.compute_operands(geometry, forces, 0..contacts);
                 self.fill((geometry.directions(), forces), 0..runs, &mut column);
             },
         );
@@ -119,7 +119,7 @@ impl ContactMatrix {
         self.lacks_values = false;
     }
 
-    /// Whether all values are of the present positions and contacts.
+    /// Whether all values are of these positions and contacts.
     pub(crate) fn is_complete(&self) -> bool {
         !self.lacks_values
     }
@@ -144,13 +144,13 @@ impl ContactMatrix {
     }
 
     /// Whether there are two threads, and work for both.
-    pub(super) fn is_for_two(&self) -> bool {
+    pub(crate) fn is_for_two(&self) -> bool {
         are_two_for(self.len())
     }
 
     /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
     /// those of its own stretch or of one before.
-    fn refresh_by_one(
+    fn assemble_by_one(
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
@@ -174,7 +174,7 @@ impl ContactMatrix {
                     part.refresh(packing, &pairs[own.clone()]);
                     largest = largest.max(self.largest_overlap(geometry, own.clone()));
                     if in_single {
-                        self.look(geometry, forces, own);
+                        self.compute_operands(geometry, forces, own);
                     }
                     let at = (geometry.directions(), forces);
                     self.fill(at, runs[0]..runs[1], &mut column);
@@ -191,37 +191,37 @@ impl ContactMatrix {
 
     /// What single precision knows of some contacts.
     #[inline(always)]
-    fn look(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
-        let seen = Seen {
-            sights: &mut self.sights[contacts.clone()],
+    fn compute_operands(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
+        let operands = Operands {
+            operands: &mut self.operands[contacts.clone()],
             loads: &mut self.loads[contacts.clone()],
         };
         let of = [&self.diagonal[..], &self.scaling, forces];
-        seen.look(geometry.directions(), of, contacts, self.units);
+        operands.compute(geometry.directions(), of, contacts, self.units);
     }
 
-    /// [`look`](Self::look) at all contacts, the first `half` of them and the others.
-    fn look_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
+    /// [`compute_operands`](Self::compute_operands) at all contacts, the first `half` of them and the others.
+    fn compute_operands_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
         let (of, units) = ([&self.diagonal[..], &self.scaling, forces], self.units);
-        let (sights, more_sights) = self.sights.split_at_mut(half);
+        let (operands, more_operands) = self.operands.split_at_mut(half);
         let (loads, more_loads) = self.loads.split_at_mut(half);
-        let look = |seen: Seen<'_>, contacts: Range<usize>| {
+        let compute = |operands: Operands<'_>, contacts: Range<usize>| {
             wide(
                 #[inline(always)]
-                || seen.look(geometry.directions(), of, contacts, units),
+                || operands.compute(geometry.directions(), of, contacts, units),
             );
         };
-        let one = Seen { sights, loads };
-        let other = Seen {
-            sights: more_sights,
+        let one = Operands { operands, loads };
+        let other = Operands {
+            operands: more_operands,
             loads: more_loads,
         };
         let all = of[0].len();
-        both(true, || look(one, 0..half), || look(other, half..all));
+        both(true, || compute(one, 0..half), || compute(other, half..all));
     }
 
     /// Half of the directions each, then half of the entries each.
-    fn refresh_by_two(
+    fn assemble_by_two(
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
@@ -242,7 +242,7 @@ impl ContactMatrix {
         );
         let (middle, all, length) = (self.middle(), self.runs.len(), self.len());
         if matches!(column, Column::Single(_)) {
-            self.look_by_two(geometry, forces, half);
+            self.compute_operands_by_two(geometry, forces, half);
         }
         let (layout, [mut one, mut other]) = self.halves(middle);
         let fill = |runs: Range<usize>, out: &mut Filled<'_>, column: &mut Column<'_>| {
@@ -278,24 +278,24 @@ impl ContactMatrix {
             end: &self.end,
             scale: &self.scale,
             scaling: &self.scaling,
-            sights: &self.sights,
+            operands: &self.operands,
             loads: &self.loads,
             units: self.units,
         };
         let (scaled, more_scaled) = self.scaled.split_at_mut(first);
         let (value, more_values) = self.value.split_at_mut(first);
-        let [room, more_room] = &mut self.rooms;
+        let [scratch, more_scratch] = &mut self.scratch;
         let one = Filled {
             first: 0,
             value,
             scaled,
-            room,
+            scratch,
         };
         let other = Filled {
             first,
             value: more_values,
             scaled: more_scaled,
-            room: more_room,
+            scratch: more_scratch,
         };
         (layout, [one, other])
     }
@@ -308,7 +308,7 @@ impl ContactMatrix {
         layout.fill(at, runs, &mut all, column);
     }
 
-    /// The largest `|δ|` (length) of some contacts, leaving out those at rest.
+    /// The largest `|δ|` (length) of some contacts, leaving out the inactive ones.
     #[inline(always)]
     pub(crate) fn largest_overlap(&self, geometry: &Geometry, contacts: Range<usize>) -> f64 {
         let larger = |m: f64, x: f64| if x > m { x } else { m };
@@ -327,15 +327,15 @@ impl ContactMatrix {
 }
 
 /// Columns of what single precision knows of some contacts.
-struct Seen<'a> {
-    sights: &'a mut [Sight],
+struct Operands<'a> {
+    operands: &'a mut [Operand],
     loads: &'a mut [f32],
 }
 
-impl Seen<'_> {
+impl Operands<'_> {
     /// From the directions of the `contacts`, and the columns of diagonal, scaling and forces of all.
     #[inline(always)]
-    fn look(
+    fn compute(
         self,
         Directions { normals, angles }: Directions<'_>,
         of: [&[f64]; 3],
@@ -352,8 +352,8 @@ impl Seen<'_> {
             *load = (f * (a * s * inverse)) as f32;
         }
         let directions = normals[contacts.clone()].iter().zip(&angles[contacts]);
-        for ((sight, s), (n, angle)) in self.sights.iter_mut().zip(scaling).zip(directions) {
-            *sight = Sight::of((-n.x, -n.y), *angle, s * units.root);
+        for ((operand, s), (n, angle)) in self.operands.iter_mut().zip(scaling).zip(directions) {
+            *operand = Operand::of((-n.x, -n.y), *angle, s * units.root);
         }
     }
 }
@@ -369,20 +369,20 @@ impl Layout<'_> {
         column: &mut Column<'_>,
     ) {
         match column {
-            Column::Double(products) => self.fill_in_double(at, runs, out, products),
-            Column::Single(products) => self.fill_in_single(runs, out, products),
+            Column::Double(products) => self.assemble_f64(at, runs, out, products),
+            Column::Single(products) => self.assemble_f32(runs, out, products),
         }
     }
 
     #[inline(always)]
-    fn fill_in_double(
+    fn assemble_f64(
         self,
         (directions, forces): (Directions<'_>, &[f64]),
         runs: Range<usize>,
         out: &mut Filled<'_>,
         products: &mut [f64],
     ) {
-        let toward = &mut out.room.toward;
+        let toward = &mut out.scratch.toward;
         for run in &self.runs[runs] {
             let ends = &self.end[run.ends()];
             // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
@@ -418,17 +418,17 @@ impl Layout<'_> {
     }
 
     #[inline(always)]
-    fn fill_in_single(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
+    fn assemble_f32(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
         let per_radius = 1.0 / (self.units.root * self.units.root);
         for run in &self.runs[runs] {
             let own = run.values().start - out.first..run.values().end - out.first;
-            let blocks = SingleBlocks {
+            let blocks = BlocksF32 {
                 ends: &self.end[run.ends()],
-                sights: self.sights,
+                operands: self.operands,
                 loads: self.loads,
                 scaled: &mut out.scaled[own],
                 products,
-                room: &mut out.room.lanes,
+                scratch: &mut out.scratch.lanes,
             };
             let particles = &self.particle[run.block..run.block + run.count];
             let radii = particles
@@ -436,13 +436,13 @@ impl Layout<'_> {
                 .map(|p| (self.scale[*p as usize] * per_radius) as f32);
             match run.size {
                 1 => {}
-                2 => fill_single::<2, 1>(blocks, radii),
-                3 => fill_single::<3, 3>(blocks, radii),
-                4 => fill_single::<4, 6>(blocks, radii),
-                5 => fill_single::<5, 10>(blocks, radii),
-                6 => fill_single::<6, 15>(blocks, radii),
-                7 => fill_single::<7, 21>(blocks, radii),
-                z => fill_single_blocks(z, blocks, radii),
+                2 => fill_f32::<2, 1>(blocks, radii),
+                3 => fill_f32::<3, 3>(blocks, radii),
+                4 => fill_f32::<4, 6>(blocks, radii),
+                5 => fill_f32::<5, 10>(blocks, radii),
+                6 => fill_f32::<6, 15>(blocks, radii),
+                7 => fill_f32::<7, 21>(blocks, radii),
+                z => fill_f32_blocks(z, blocks, radii),
             }
         }
     }

@@ -1,19 +1,26 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 
-use super::bulges::Bulges;
-use super::candidates::Candidates;
-use super::complementarity::Violation;
-use super::error::ContactError;
-use super::matrix::{ContactMatrix, Geometry, Precision};
-use super::patch::Patch;
-use super::present::{Present, name_of};
-use super::product::FirstProducts;
-use super::search::Search;
-use super::set::ContactSet;
-use super::solver::{LinearSolver, Method};
-use super::tolerance::{ACCEPTED, relative_tolerance, slack};
+pub mod complementarity;
+#[cfg(test)]
+mod history;
+mod local_region;
+mod local_update;
+mod ordered;
+
+use crate::models::droplet::contact::bulges::Bulges;
+use crate::models::droplet::contact::candidates::Candidates;
+use crate::models::droplet::contact::error::ContactError;
+use crate::models::droplet::contact::matrix::product::FirstProducts;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry, Precision};
+use crate::models::droplet::contact::search::Search;
+use crate::models::droplet::contact::set::ContactSet;
+use crate::models::droplet::contact::solver::{LinearSolver, Method};
+use crate::models::droplet::contact::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::state::Packing;
+pub(super) use complementarity::Violation;
 use core::f64::consts::PI;
+use local_region::LocalRegion;
+use ordered::{Ordered, name_of};
 use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
@@ -60,44 +67,44 @@ pub enum Rule {
 /// ```
 #[derive(Clone, Debug)]
 pub struct ContactLaw {
-    pub(super) rule: Rule,
-    pub(super) line_tension: f64,
-    pub(super) tolerance: f64,
-    pub(super) solver: LinearSolver,
-    pub(super) geometry: Geometry,
-    pub(super) matrix: ContactMatrix,
-    pub(super) set: ContactSet,
+    rule: Rule,
+    line_tension: f64,
+    tolerance: f64,
+    solver: LinearSolver,
+    geometry: Geometry,
+    matrix: ContactMatrix,
+    set: ContactSet,
     /// What came (`true`) and went in the last solution, one after the other.
-    pub(super) changes: Vec<([u32; 2], bool)>,
+    changes: Vec<([u32; 2], bool)>,
     /// The names of the set of contacts before the last solution and now.
-    pub(super) sets: (u64, u64),
+    sets: (u64, u64),
     /// Whether geometry and matrix have the structure of the set, and whether their values are those of the positions.
-    pub(super) structured: bool,
-    pub(super) refreshed: bool,
+    structured: bool,
+    assembled: bool,
     /// The contacts in their order, if somebody asked for them.
-    pub(super) present: OnceLock<Present>,
-    pub(super) candidates: Candidates,
+    ordered: OnceLock<Ordered>,
+    candidates: Candidates,
     /// What the first residual of this solution is computed in.
-    pub(super) precision: Precision,
-    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
-    pub(super) slack: f64,
-    pub(super) image: Vec<f64>,
-    pub(super) products: FirstProducts,
-    pub(super) bulges: Bulges,
+    precision: Precision,
+    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](crate::models::droplet::contact::due_tolerance).
+    slack: f64,
+    image: Vec<f64>,
+    products: FirstProducts,
+    bulges: Bulges,
     /// The largest overlap of contours outside the set that the tolerance lets pass (length).
-    pub(super) tolerated: f64,
+    tolerated: f64,
     /// Searches for pairs that touch, in each of two threads.
-    pub(super) searches: [Search; 2],
-    pub(super) patch: Patch,
+    searches: [Search; 2],
+    region: LocalRegion,
     /// Particles whose bulge is beyond all reason, the first of them.
-    pub(super) diverged: Option<(usize, f64)>,
-    pub(super) violations: Vec<Violation>,
+    diverged: Option<(usize, f64)>,
+    violations: Vec<Violation>,
     /// The largest `|δ|` of the contacts (length).
-    pub(super) scale: f64,
+    scale: f64,
     /// The largest `|A f − δ|` (length).
-    pub(super) off: f64,
-    pub(super) residual: f64,
-    pub(super) work: Work,
+    equation: f64,
+    residual: f64,
+    work: Work,
 }
 
 /// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
@@ -114,9 +121,9 @@ pub struct Work {
     /// Iterations of the linear solver.
     pub iterations: u64,
     /// Exchanges of few contacts after which only the forces around them were solved for.
-    pub patches: u64,
-    /// Iterations of the linear solver on such patches.
-    pub patch_iterations: u64,
+    pub local_updates: u64,
+    /// Iterations of the linear solver on such regions.
+    pub local_iterations: u64,
     /// Geometries computed of all contacts; after an exchange only that of new ones is.
     pub assemblies: u64,
     /// Those of which entries were computed in single precision, which is enough far from balance.
@@ -154,8 +161,8 @@ impl ContactLaw {
             changes: Vec::new(),
             sets: (0, 0),
             structured: false,
-            refreshed: false,
-            present: OnceLock::new(),
+            assembled: false,
+            ordered: OnceLock::new(),
             candidates: Candidates::default(),
             precision: Precision::Double,
             slack: 0.0,
@@ -164,11 +171,11 @@ impl ContactLaw {
             bulges: Bulges::default(),
             tolerated: 0.0,
             searches: Default::default(),
-            patch: Patch::default(),
+            region: LocalRegion::default(),
             diverged: None,
             violations: Vec::new(),
             scale: 0.0,
-            off: 0.0,
+            equation: 0.0,
             residual: 0.0,
             work: Work::default(),
         }
@@ -186,7 +193,7 @@ impl ContactLaw {
     }
 
     /// `1/2πγ`.
-    pub(super) fn per_radius(&self) -> f64 {
+    fn per_radius(&self) -> f64 {
         1.0 / (2.0 * PI * self.line_tension)
     }
 
@@ -212,7 +219,7 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
-        self.refreshed = false;
+        self.assembled = false;
         self.candidates.move_by(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
@@ -220,7 +227,7 @@ impl ContactLaw {
     }
 
     fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.present.take();
+        self.ordered.take();
         let known = self.set.is_ordered() && self.set.pairs() == pairs;
         if !known || !self.candidates.is_of(packing) {
             self.set.replace(pairs);
@@ -317,10 +324,10 @@ impl ContactLaw {
         f_max: f64,
         moved: f64,
     ) -> Result<(), ContactError> {
-        self.present.take();
+        self.ordered.take();
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.refreshed = false;
+        self.assembled = false;
         self.candidates.move_by(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
@@ -342,7 +349,7 @@ impl ContactLaw {
             // It solves twice and takes what comes.
             return Ok(());
         }
-        self.present.take();
+        self.ordered.take();
         self.slack = slack(packing, f_max);
         self.settle(packing)?;
         self.check_answer(packing)
@@ -358,7 +365,7 @@ impl ContactLaw {
     }
 
     /// The tolerance that is due in a frame whose largest net force is `f_max` (units of γ), with the contacts found last;
-    /// see [`due_tolerance`](super::due_tolerance).
+    /// see [`due_tolerance`](crate::models::droplet::contact::due_tolerance).
     #[must_use]
     pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
         match self.rule {
@@ -371,13 +378,13 @@ impl ContactLaw {
 
     /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
     /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
-    pub(super) fn passed_over(&self, scale: f64) -> f64 {
+    fn passed_over(&self, scale: f64) -> f64 {
         let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
         part * ACCEPTED * self.allowed(scale)
     }
 
     /// The residual looked for, as a length; `scale` is the largest `|δ|`.
-    pub(super) fn allowed(&self, scale: f64) -> f64 {
+    fn allowed(&self, scale: f64) -> f64 {
         scale * relative_tolerance(self.tolerance, self.slack, scale)
     }
 }

@@ -3,7 +3,7 @@
 //! # The way to the answer
 //!
 //! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set
-//! with a negative gap ought to come. [`Rule::Complementarity`](super::Rule::Complementarity) exchanges them all at once and solves again, which
+//! with a negative gap ought to come. [`Rule::Complementarity`](crate::models::droplet::contact::Rule::Complementarity) exchanges them all at once and solves again, which
 //! takes one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
@@ -22,21 +22,20 @@
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
-use super::error::ContactError;
-use super::images::{Loaded, second_image};
-use super::law::ContactLaw;
-use super::list::ContactList;
-use super::matrix::Precision;
-use super::product::First;
-use super::search::At;
-use super::sight::rounding;
-use super::solver::{LinearSolver, Progress, SolverError};
-use super::tolerance::ACCEPTED;
+use super::ContactLaw;
+use crate::models::droplet::contact::error::ContactError;
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::Precision;
+use crate::models::droplet::contact::matrix::rounding;
+use crate::models::droplet::contact::search::Conditions;
+use crate::models::droplet::contact::second_image::{Loaded, second_image};
+use crate::models::droplet::contact::solver::{LinearSolver, Progress, SolverError};
+use crate::models::droplet::contact::tolerance::ACCEPTED;
 use crate::numerics::threads::both;
 use crate::numerics::wide::wide;
 use crate::state::Packing;
 
-/// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
+/// The widest bulge that candidates are looked for with, in units of the largest radius. Conditions φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
@@ -47,7 +46,7 @@ const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Violation {
+pub(in crate::models::droplet::contact) enum Violation {
     /// Contact number `.0` pulls.
     Drop(usize, [u32; 2]),
     /// This pair overlaps and has no force; `.1` is a first guess of it.
@@ -67,7 +66,7 @@ impl ContactLaw {
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
-        let (mut best, mut mends) = (usize::MAX, 3);
+        let (mut best, mut updates) = (usize::MAX, 3);
         self.precision = self.precision_for(packing);
         let mut patience = PATIENCE;
         for _ in 0..most {
@@ -76,11 +75,11 @@ impl ContactLaw {
             if count == 0 {
                 return Ok(());
             }
-            if mends > 0 && self.is_mendable() {
-                mends -= 1;
-                if self.mend(packing) {
+            if updates > 0 && self.is_local() {
+                updates -= 1;
+                if self.update_locally(packing) {
                     self.assemble(packing);
-                    let (scale, worst) = (self.scale(), self.off.max(self.tolerated));
+                    let (scale, worst) = (self.scale(), self.equation.max(self.tolerated));
                     self.residual = if scale > 0.0 { worst / scale } else { worst };
                     return Ok(());
                 }
@@ -116,28 +115,28 @@ impl ContactLaw {
     }
 
     /// Whether few contacts offend, and the tolerance is one that a sum of residuals may be held against.
-    fn is_mendable(&self) -> bool {
+    fn is_local(&self) -> bool {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
             && 64 * self.violations.len() <= self.set.active()
     }
 
-    /// Forces of the present set, and the pairs that offend, in the order of the list.
+    /// Forces of the set, and the pairs that offend, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         let multiplied = self.assemble(packing);
         let iterations = self.find_forces(packing, multiplied)?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
-            Some(largest) => self.off = largest,
+            Some(largest) => self.equation = largest,
             None => self.measure_equation(),
         }
         self.inspect(packing);
         Ok(())
     }
 
-    /// Solves `A f = δ` of the present set; returns the iterations. `multiplied` says that `products` are of the present forces.
+    /// Solves `A f = δ` of the set; returns the iterations. `multiplied` says that `products` are of the forces.
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
@@ -147,7 +146,7 @@ impl ContactLaw {
         if !multiplied && in_single {
             let (geometry, products) = (&self.geometry, &mut self.products);
             self.matrix
-                .fill_in_single(geometry, self.set.forces(), products);
+                .assemble_f32(geometry, self.set.forces(), products);
         } else if direct || !multiplied {
             self.matrix.complete(&self.geometry);
         }
@@ -157,9 +156,9 @@ impl ContactLaw {
         };
         let goal = (tolerance, loosely);
         let products = if in_single {
-            Some(First::Single(self.products.single.sums()))
+            Some(self.products.single())
         } else {
-            multiplied.then_some(First::Double(self.products.double.sums()))
+            multiplied.then(|| self.products.double())
         };
         let from = (products, 0);
         let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
@@ -183,10 +182,10 @@ impl ContactLaw {
         solver.finish(matrix, overlaps, forces, tolerance, iterations)
     }
 
-    /// Geometry and matrix of the present set at the present positions; what still stands is not done again. Says whether it was
-    /// not, and `products` are those of the off-diagonal entries of `A` with the present forces.
+    /// Geometry and matrix of the set at these positions; what still stands is not done again. Says whether it was
+    /// not, and `products` are those of the off-diagonal entries of `A` with the forces.
     pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
-        if !self.refreshed && self.is_untidy() {
+        if !self.assembled && self.is_untidy() {
             self.put_in_order(&[]);
         }
         if !self.structured {
@@ -198,14 +197,14 @@ impl ContactLaw {
             self.matrix
                 .restructure(packing, &list, duplicate, self.line_tension);
         }
-        let anew = !(self.structured && self.refreshed);
+        let anew = !(self.structured && self.assembled);
         if anew {
             let (geometry, products) = (&mut self.geometry, &mut self.products);
             let at = (packing, self.set.pairs(), self.set.forces());
-            self.scale = self.matrix.refresh(geometry, at, products, self.precision);
+            self.scale = self.matrix.assemble(geometry, at, products, self.precision);
             self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
-            (self.structured, self.refreshed) = (true, true);
+            (self.structured, self.assembled) = (true, true);
         }
         anew
     }
@@ -233,26 +232,26 @@ impl ContactLaw {
         self.scale
     }
 
-    /// `max |A f − δ|` of the present forces.
+    /// `max |A f − δ|` of the forces.
     pub(super) fn measure_equation(&mut self) {
         self.image.resize(self.set.len(), 0.0);
         self.matrix.complete(&self.geometry);
         self.matrix.multiply(self.set.forces(), &mut self.image);
-        self.off = 0.0;
+        self.equation = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
         for ((q, d), s) in rows.zip(self.matrix.scaling()) {
             if *s > 0.0 {
-                self.off = self.off.max((d - q).abs());
+                self.equation = self.equation.max((d - q).abs());
             }
         }
     }
 
-    /// Measures how far the present forces are from the contact law, and lists the pairs that offend.
+    /// Measures how far the forces are from the contact law, and lists the pairs that offend.
     pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
         self.bound_bulges(packing);
         let tolerance = self.passed_over(scale);
-        let worst = self.off.max(self.find_violations(packing, tolerance));
+        let worst = self.equation.max(self.find_violations(packing, tolerance));
         self.residual = if scale > 0.0 { worst / scale } else { worst };
     }
 
@@ -346,7 +345,7 @@ impl ContactLaw {
         }
         let candidates = self.candidates.pairs();
         self.work.distances += (candidates.len() + self.set.inactive().len()) as u64;
-        let at = At {
+        let at = Conditions {
             packing,
             line_tension: self.line_tension,
             geometry: &self.geometry,
@@ -378,7 +377,7 @@ impl ContactLaw {
 
     /// Exchanges the first `count` offending pairs between the two sides.
     ///
-    /// A contact that leaves is laid to rest where it is, and one that comes back is woken; others are added behind those
+    /// A contact that leaves becomes inactive where it is, and one that comes back becomes active; others are added behind those
     /// that there are. Neither touches the rest of the structure.
     pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
         debug_assert!(
@@ -395,13 +394,13 @@ impl ContactLaw {
                 Violation::Drop(contact, _) => {
                     left = left.max(self.geometry.overlaps()[contact].abs());
                     self.set.deactivate(contact);
-                    self.matrix.set_at_rest(contact, true);
+                    self.matrix.deactivate(contact);
                 }
                 Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
                     Some(contact) => {
                         joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
                         self.set.activate(contact as usize, guess);
-                        self.matrix.set_at_rest(contact as usize, false);
+                        self.matrix.activate(contact as usize);
                     }
                     None => came.push((pair, guess)),
                 },

@@ -1,12 +1,12 @@
 //! The contacts as they are seen from outside: in the order of pairs, and no other among them. And what can be read off them in
 //! the order of their numbers, with the same bits.
 
-use super::law::ContactLaw;
-use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry};
+use super::ContactLaw;
 use crate::contacts::net_forces;
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
 use core::ops::Range;
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ impl ContactLaw {
         if self.set.is_ordered() {
             self.numbered()
         } else {
-            self.present().contacts()
+            self.ordered().contacts()
         }
     }
 
@@ -33,7 +33,7 @@ impl ContactLaw {
         }
     }
 
-    /// The contacts in the order of their numbers, those at rest among them with no force.
+    /// The contacts in the order of their numbers, the inactive ones among them with no force.
     pub(crate) fn numbered(&self) -> Contacts<'_> {
         Contacts {
             pairs: self.set.pairs(),
@@ -50,7 +50,7 @@ impl ContactLaw {
         if self.set.is_ordered() && self.matrix.is_complete() {
             &self.matrix
         } else {
-            self.present().matrix(&self.matrix, &self.geometry)
+            self.ordered().matrix(&self.matrix, &self.geometry)
         }
     }
 
@@ -94,15 +94,15 @@ impl ContactLaw {
         self.set.active()
     }
 
-    pub(super) fn present(&self) -> &Present {
-        self.present
-            .get_or_init(|| Present::of(&self.numbered(), &self.set.in_order(), &self.matrix))
+    pub(super) fn ordered(&self) -> &Ordered {
+        self.ordered
+            .get_or_init(|| Ordered::of(&self.numbered(), &self.set.in_order(), &self.matrix))
     }
 }
 
-/// The contacts that are not at rest, in the order of pairs.
+/// The contacts that are active, in the order of pairs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Present {
+pub(super) struct Ordered {
     /// Their numbers.
     order: Vec<u32>,
     contacts: FrameContacts,
@@ -110,7 +110,7 @@ pub(super) struct Present {
     matrix: OnceLock<ContactMatrix>,
 }
 
-impl Present {
+impl Ordered {
     /// Those `stretches` of `numbered`, the contacts of `matrix`.
     fn of(numbered: &Contacts<'_>, stretches: &[Range<usize>], matrix: &ContactMatrix) -> Self {
         let order = stretches.iter().cloned().flatten();
