@@ -183,7 +183,7 @@ mod tests {
             }
             let force = |c: usize| {
                 let wave = libm::sin(0.37 * c as f64 + 0.021 * f64::from(step));
-                // Most grow and shrink, some are at rest, some pull.
+                // Most grow and shrink, some are 0, some pull.
                 if c % 7 == 3 {
                     0.0
                 } else {

@@ -7,7 +7,7 @@
 //! takes one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
-//! (1994)): when three sweeps have not lowered the number of offending pairs below its best, only the *first* offending
+//! (1994)): when three sweeps have not lowered the number of violating pairs below its best, only the *first* violating
 //! pair in the order of the list is exchanged, until the number falls below its best. With the first pair alone the
 //! sequence is Murty's (K. G. Murty, Opsearch 11, 54 (1974)), which reaches the answer of a problem whose matrix is
 //! positive definite in finitely many exchanges; so the best number falls again and again, down to zero.
@@ -62,7 +62,7 @@ impl Violation {
 }
 
 impl ContactLaw {
-    /// Exchanges contacts until none offends.
+    /// Exchanges contacts until no pair violates the law.
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
@@ -114,7 +114,7 @@ impl ContactLaw {
         }
     }
 
-    /// Whether few contacts offend, and the tolerance is one that a sum of residuals may be held against.
+    /// Whether few pairs violate the law, and the tolerance is one that a sum of residuals may be held against.
     fn is_local(&self) -> bool {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
@@ -122,7 +122,7 @@ impl ContactLaw {
             && 64 * self.violations.len() <= self.set.active()
     }
 
-    /// Forces of the set, and the pairs that offend, in the order of the list.
+    /// Forces of the set, and the pairs that violate the law, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         let multiplied = self.assemble(packing);
@@ -246,7 +246,7 @@ impl ContactLaw {
         }
     }
 
-    /// Measures how far the forces are from the contact law, and lists the pairs that offend.
+    /// Measures how far the forces are from the contact law, and lists the pairs that violate it.
     pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
         self.bound_bulges(packing);
@@ -314,7 +314,7 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest violation, below it or above.
+    /// Lists the pairs that violate the law by more than `tolerance` (length); returns the largest violation, below it or above.
     fn find_violations(&mut self, packing: &Packing, tolerance: f64) -> f64 {
         self.candidates.list(&self.set);
         self.violations.clear();
@@ -375,7 +375,7 @@ impl ContactLaw {
         worst
     }
 
-    /// Exchanges the first `count` offending pairs between the two sides.
+    /// Exchanges the first `count` violating pairs between the two sides.
     ///
     /// A contact that leaves becomes inactive where it is, and one that comes back becomes active; others are added behind those
     /// that there are. Neither touches the rest of the structure.

@@ -1,4 +1,9 @@
 //! A region of contacts on which the forces are corrected: see [`local_update`](super::local_update).
+//!
+//! - A contact's number is that of the set; contacts that came in this local update follow behind.
+//! - `place` of a contact is its row in `rows` and `contacts`, or `NOWHERE`, or `GONE` if it is inactive.
+//! - A particle with a block has all its active contacts in the region; a contact may have one particle without.
+//! - Between local updates the region is empty, every `place` is `NOWHERE` and every `left_of` is 0.
 
 use crate::models::droplet::contact::geometry::Geometry;
 use crate::models::droplet::contact::matrix::compliance;
@@ -30,8 +35,7 @@ impl Added {
     }
 }
 
-/// The region, and the exchanges of the local update that it belongs to. A contact's number is that of the law; those that come in this local update
-/// follow behind.
+/// The region, and the exchanges of the local update that it belongs to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LocalRegion {
     /// The forces of all contacts with the exchanges that were made.

@@ -26,7 +26,7 @@ use crate::state::{Packing, unit_and_length};
 const ROUNDS: usize = 8;
 
 impl ContactLaw {
-    /// Exchanges the offending contacts and updates the forces around them until none offends; says whether it got there.
+    /// Exchanges the violating pairs and corrects the forces around them until no pair violates the law; says whether it got there.
     /// If not, the contacts are exchanged all the same, with forces to go on from.
     pub(super) fn update_locally(&mut self, packing: &Packing) -> bool {
         let mut region = core::mem::take(&mut self.region);
@@ -105,7 +105,7 @@ impl ContactLaw {
         false
     }
 
-    /// Exchanges an offending pair, if it still offends by more than `tolerance` (length); returns its contact and by how much
+    /// Exchanges a violating pair, if it still violates the law by more than `tolerance` (length); returns its contact and by how much
     /// the force of that has changed.
     fn change(
         &mut self,
@@ -147,7 +147,7 @@ impl ContactLaw {
         }
     }
 
-    /// Lists the pairs that offend around the regions of a round; `false` if the forces diverge.
+    /// Lists the pairs that violate the law around the regions of a round; `false` if the forces diverge.
     fn inspect_round(&mut self, packing: &Packing, region: &LocalRegion, tolerance: f64) -> bool {
         let per_radius = self.per_radius();
         let widest = WIDEST_BULGE * packing.largest_radius();

@@ -1,4 +1,8 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
+//!
+//! - The [set](super::set) alone says which pairs are in contact; geometry and matrix have its numbers once it is `structured`.
+//! - Geometry and matrix are of the positions solved last once the set is `assembled`.
+//! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
 pub mod complementarity;
 #[cfg(test)]
@@ -78,16 +82,18 @@ pub struct ContactLaw {
     changes: Vec<([u32; 2], bool)>,
     /// The names of the set of contacts before the last solution and now.
     sets: (u64, u64),
-    /// Whether geometry and matrix have the structure of the set, and whether their values are those of the positions.
+    /// Whether geometry and matrix have the contacts of the set by its numbers.
     structured: bool,
+    /// Whether geometry and matrix are of the positions at hand.
     assembled: bool,
-    /// The contacts in their order, if somebody asked for them.
+    /// The active contacts in the order of pairs, once they are asked for.
     ordered: OnceLock<Ordered>,
     candidates: Candidates,
     /// What the first residual of this solution is computed in.
     precision: Precision,
     /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](crate::models::droplet::contact::due_tolerance).
     slack: f64,
+    /// `A f`, where the solver does not know the residual (length).
     image: Vec<f64>,
     products: FirstProducts,
     bulges: Bulges,
@@ -96,7 +102,7 @@ pub struct ContactLaw {
     /// Searches for pairs that touch, in each of two threads.
     searches: [Search; 2],
     region: LocalRegion,
-    /// Particles whose bulge is beyond all reason, the first of them.
+    /// The first particle whose bulge was cut short, and the bound of its bulge (length); its forces diverged.
     diverged: Option<(usize, f64)>,
     violations: Vec<Violation>,
     /// The largest `|δ|` of the contacts (length).

@@ -14,7 +14,7 @@ use core::f64::consts::PI;
 pub(super) const LANES: usize = 8;
 
 /// What an entry is made of at one of its two contacts, by their bits: cosine and sine of the direction from the lower particle to the
-/// higher; its angle to the x axis in units of 2π/2³², which wraps; `A_cc^(−½)` in units of `(R_max/2πγ)^(−½)`, 0 for a inactive
+/// higher; its angle to the x axis in units of 2π/2³², which wraps; `A_cc^(−½)` in units of `(R_max/2πγ)^(−½)`, 0 for an inactive
 /// contact.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(16))]

@@ -1,5 +1,10 @@
 //! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
 //!
+//! - Rows are the numbers of the contacts. An inactive contact has a row, whose scaling is 0.
+//! - A particle with contacts has one block; a block names its contacts in the order of the particle's partners.
+//! - The first `sorted` runs hold whole stretches of particles. A block that a contact was added to stands behind them, alone.
+//! - Behind an assembly `scaled` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
+//!
 //! See the example of [`ContactMatrix`].
 
 mod assemble;
@@ -57,13 +62,15 @@ use product::{Number, Products, product, product_of_blocks};
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct ContactMatrix {
+    /// `A_cc` (length per force).
     diagonal: Vec<f64>,
-    /// `A_cc^(−½)`, and 0 for a inactive contact.
+    /// `A_cc^(−½)`, and 0 for an inactive contact.
     scaling: Vec<f64>,
     /// A bound of `A_cc^½`.
     largest_root: f64,
-    /// Runs of blocks of one size, and how many of them were sorted.
+    /// Runs of blocks of one size.
     runs: Vec<Run>,
+    /// How many of the runs were sorted when the structure was built.
     sorted: usize,
     /// The particle of each block.
     particle: Vec<u32>,
@@ -75,13 +82,15 @@ pub struct ContactMatrix {
     value: Vec<f64>,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for inactive contacts.
     scaled: Vec<f32>,
-    /// What entries in single precision are made from, and multiplied with in the first place: see [`operand`](entries_f32).
+    /// What entries in single precision are computed from, see [`entries_f32`].
     operands: Vec<Operand>,
+    /// `A_cc^½ f_c`, in units of `units.load`: what entries in single precision are multiplied with first.
     loads: Vec<f32>,
+    /// What single precision counts in.
     units: Units,
-    /// Whether the values are not those of these positions and contacts; an empty matrix lacks none.
+    /// Whether `value` is not of the positions and contacts at hand; an empty matrix lacks none.
     lacks_values: bool,
-    /// Room for a run, in each of two threads.
+    /// Buffers for a run, one a thread.
     scratch: [Scratch; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
     stretches: Vec<[usize; 2]>,
@@ -89,7 +98,7 @@ pub struct ContactMatrix {
     block_of: Vec<u32>,
     /// The particles of each contact.
     pairs: Vec<[u32; 2]>,
-    /// Whether contacts were added, or are inactive.
+    /// Whether a contact was added or is inactive.
     changed: bool,
 }
 
