@@ -6,6 +6,7 @@
 
 use crate::models::droplet::kernel::{G_AT_CONTACT, G_MAX};
 use crate::numerics::wide::wide;
+use crate::state::Packing;
 
 /// What a force is counted with to spare, in units of the mean force.
 const SPARE: f64 = 0.05;
@@ -148,6 +149,14 @@ impl Bulges {
         first
     }
 
+    /// Whether two particles are so near that their bulges might meet.
+    #[inline]
+    pub(super) fn may_touch(&self, packing: &Packing, pair: [u32; 2]) -> bool {
+        let ([i, j], radii) = (pair.map(|p| p as usize), packing.radii());
+        let reach = radii[i] + radii[j] + self.of(i) + self.of(j);
+        packing.separation(i, j).norm_squared() < reach * reach
+    }
+
     /// A particle's bound as it is known to be now.
     pub(super) fn widen(&mut self, p: usize, bound: f64) {
         if bound > self.bound[p] {
@@ -174,7 +183,7 @@ mod tests {
             }
             let force = |c: usize| {
                 let wave = libm::sin(0.37 * c as f64 + 0.021 * f64::from(step));
-                // Most grow and shrink, some are at rest, some pull.
+                // Most grow and shrink, some are 0, some pull.
                 if c % 7 == 3 {
                     0.0
                 } else {

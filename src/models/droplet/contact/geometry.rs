@@ -33,7 +33,7 @@ pub struct Geometry {
     angles: Vec<f64>,
     duplicate: DuplicateContactList,
     /// Room for the components of the normals and the making of the angles, in each of two threads.
-    rooms: [Room; 2],
+    scratch: [Scratch; 2],
 }
 
 /// The directions of contacts as a loop wants them: as slices, whose places are known. At N = 1024 a step takes 2 to 3 % longer
@@ -67,7 +67,7 @@ impl Directions<'_> {
 
 /// Room for some contacts.
 #[derive(Clone, Debug, Default)]
-struct Room {
+struct Scratch {
     x: Vec<f64>,
     y: Vec<f64>,
     nodes: Vec<[f64; 2]>,
@@ -79,7 +79,7 @@ pub(crate) struct Part<'a> {
     distances: &'a mut [f64],
     overlaps: &'a mut [f64],
     angles: &'a mut [f64],
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 impl Geometry {
@@ -133,7 +133,7 @@ impl Geometry {
             distances: &mut self.distances[contacts.clone()],
             overlaps: &mut self.overlaps[contacts.clone()],
             angles: &mut self.angles[contacts],
-            room: &mut self.rooms[0],
+            scratch: &mut self.scratch[0],
         }
     }
 
@@ -143,20 +143,20 @@ impl Geometry {
         let (distances, more_distances) = self.distances.split_at_mut(middle);
         let (overlaps, more_overlaps) = self.overlaps.split_at_mut(middle);
         let (angles, more_angles) = self.angles.split_at_mut(middle);
-        let [room, more_room] = &mut self.rooms;
+        let [scratch, more_scratch] = &mut self.scratch;
         let one = Part {
             normals,
             distances,
             overlaps,
             angles,
-            room,
+            scratch,
         };
         let other = Part {
             normals: more_normals,
             distances: more_distances,
             overlaps: more_overlaps,
             angles: more_angles,
-            room: more_room,
+            scratch: more_scratch,
         };
         [one, other]
     }
@@ -232,7 +232,7 @@ impl Part<'_> {
         let (positions, radii) = (packing.positions(), packing.radii());
         let domain = packing.domain();
         let angles = Angles::new();
-        for column in [&mut self.room.x, &mut self.room.y] {
+        for column in [&mut self.scratch.x, &mut self.scratch.y] {
             column.resize(TOGETHER, 0.0);
         }
         // Some contacts at a time, so that what is computed of them stays in the fastest memory.
@@ -243,7 +243,7 @@ impl Part<'_> {
         let groups = groups.zip(pairs.chunks(TOGETHER));
         for (((distances, overlaps), normals), (own, pairs)) in columns.zip(groups) {
             let count = pairs.len();
-            let (x, y) = (&mut self.room.x[..count], &mut self.room.y[..count]);
+            let (x, y) = (&mut self.scratch.x[..count], &mut self.scratch.y[..count]);
             let rows = x.iter_mut().zip(&mut *y).zip(&mut *overlaps);
             for (&[i, j], ((x, y), overlap)) in pairs.iter().zip(rows) {
                 let (i, j) = (i as usize, j as usize);
@@ -269,7 +269,7 @@ impl Part<'_> {
                 *normal = Vec2::new(*x, *y);
                 (*x, *y) = (-*x, -*y);
             }
-            angles.of_columns((x, y), &mut self.room.nodes, own);
+            angles.of_columns((x, y), &mut self.scratch.nodes, own);
         }
     }
 }

@@ -20,29 +20,21 @@
 //! [`ContactLaw`] is what the rest of the crate sees: positions in, contacts and forces out. A second law would be
 //! added behind it.
 
-mod blocks;
 mod bulges;
-pub mod complementarity;
+mod candidates;
 mod error;
-mod fill;
 mod geometry;
-#[cfg(test)]
-mod history;
-mod images;
 mod law;
 pub mod list;
 pub mod matrix;
-mod mend;
-mod patch;
-mod present;
-pub(crate) mod product;
-mod refresh;
 mod search;
-mod sight;
+mod second_image;
+mod set;
 pub mod solver;
 mod tolerance;
 
 pub use error::ContactError;
+pub use law::complementarity;
 pub use law::{ContactLaw, Rule, Work};
 pub(crate) use tolerance::ACCEPTED;
 pub use tolerance::due_tolerance;

@@ -3,7 +3,7 @@
 use super::SolverError;
 use super::single::Single;
 use crate::models::droplet::contact::matrix::ContactMatrix;
-use crate::models::droplet::contact::product::{First, Products};
+use crate::models::droplet::contact::matrix::product::{First, Products};
 use crate::numerics::wide::wide;
 
 /// Conjugate gradients with the diagonal as preconditioner; owns its vectors, so a solve allocates nothing once they are
@@ -168,7 +168,7 @@ impl ConjugateGradient {
         self.largest
     }
 
-    /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); contacts at rest have none.
+    /// `residual = δ − A f`, and its largest magnitude (NaN if any entry is); inactive contacts have none.
     fn true_residual(&mut self, matrix: &ContactMatrix, overlaps: &[f64], forces: &[f64]) -> f64 {
         matrix.off_diagonal_products(forces, &mut self.image);
         let image = core::mem::take(&mut self.image);
@@ -275,7 +275,7 @@ impl Product for f32 {
     }
 }
 
-/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for contacts at rest; returns the largest `|r|`,
+/// `r = δ − (A_cc f + q)` with `q` from the off-diagonal entries, 0 for inactive contacts; returns the largest `|r|`,
 /// `|D^(−½) r|` and `|A_cc f|`, NaN if any is.
 #[inline(always)]
 fn subtract<Q: Product>(

@@ -1,12 +1,12 @@
 //! The entries of [`ContactMatrix`] at new positions, and its products, by one thread or by two.
 
 use super::blocks::Run;
-use super::fill::{Blocks, fill, fill_blocks};
-use super::geometry::{Directions, Geometry, Part};
-use super::matrix::{ContactMatrix, Precision, Units};
+use super::entries_f32::{BlocksF32, Lanes, Operand, fill_f32, fill_f32_blocks};
+use super::entries_f64::{Blocks, fill, fill_blocks};
 use super::product::{FirstProducts, Number, Products};
-use super::sight::{Lanes, Sight, SingleBlocks, fill_single, fill_single_blocks};
+use super::{ContactMatrix, Precision, Units};
 use crate::domain::Vec2;
+use crate::models::droplet::contact::geometry::{Directions, Geometry, Part};
 use crate::models::droplet::kernel::Direction;
 use crate::numerics::threads::{are_two_for, both};
 use crate::numerics::wide::wide;
@@ -15,9 +15,8 @@ use core::ops::Range;
 
 /// Room for what is computed of a run and not kept.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Room {
+pub(super) struct Scratch {
     toward: Vec<Direction>,
-    values: Vec<f64>,
     lanes: Vec<Lanes>,
 }
 
@@ -29,18 +28,17 @@ struct Layout<'a> {
     end: &'a [u32],
     scale: &'a [f64],
     scaling: &'a [f64],
-    sights: &'a [Sight],
+    operands: &'a [Operand],
     loads: &'a [f32],
     units: Units,
 }
 
-/// Where the entries of blocks go, the first of all being number `first` of the matrix; the values themselves only where they are
-/// to be kept.
+/// Where the entries of blocks go, the first of all being number `first` of the matrix.
 struct Filled<'a> {
     first: usize,
-    value: Option<&'a mut [f64]>,
+    value: &'a mut [f64],
     scaled: &'a mut [f32],
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 /// The precision that entries are computed in, and the column for their products with the forces.
@@ -53,34 +51,33 @@ impl ContactMatrix {
     /// Directions and scaled values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
     /// [`products_into`](Self::products_into) has it; entries and products in this `precision`. The pairs are the contacts by number,
     /// those of `geometry`. Returns the largest `|δ|` (length).
-    pub(crate) fn refresh(
+    pub(crate) fn assemble(
         &mut self,
         geometry: &mut Geometry,
         at: (&Packing, &[[u32; 2]], &[f64]),
         products: &mut FirstProducts,
         precision: Precision,
     ) -> f64 {
-        self.lacks_values = precision == Precision::Single || !self.keeps_values;
-        self.kept += u64::from(self.is_complete());
+        self.lacks_values = precision == Precision::Single;
         let n = self.len();
         match (precision, self.is_for_two()) {
             (Precision::Single, false) => {
                 let column = Column::Single(products.single.alone(n));
-                self.refresh_by_one(geometry, at, column)
+                self.assemble_by_one(geometry, at, column)
             }
             (Precision::Double, false) => {
                 let column = Column::Double(products.double.alone(n));
-                self.refresh_by_one(geometry, at, column)
+                self.assemble_by_one(geometry, at, column)
             }
             (Precision::Single, true) => {
                 let columns = products.single.both(n).map(Column::Single);
-                let largest = self.refresh_by_two(geometry, at, columns);
+                let largest = self.assemble_by_two(geometry, at, columns);
                 products.single.add_up();
                 largest
             }
             (Precision::Double, true) => {
                 let columns = products.double.both(n).map(Column::Double);
-                let largest = self.refresh_by_two(geometry, at, columns);
+                let largest = self.assemble_by_two(geometry, at, columns);
                 products.double.add_up();
                 largest
             }
@@ -88,7 +85,7 @@ impl ContactMatrix {
     }
 
     /// The entries in single precision of the directions of `geometry`, and their products with `forces`.
-    pub(crate) fn fill_in_single(
+    pub(crate) fn assemble_f32(
         &mut self,
         geometry: &Geometry,
         forces: &[f64],
@@ -99,8 +96,8 @@ impl ContactMatrix {
         wide(
             #[inline(always)]
             || {
-                self.look(geometry, forces, 0..contacts);
-                self.fill((geometry.directions(), forces), 0..runs, &mut column, false);
+                self.compute_operands(geometry, forces, 0..contacts);
+                self.fill((geometry.directions(), forces), 0..runs, &mut column);
             },
         );
         self.lacks_values = true;
@@ -117,13 +114,12 @@ impl ContactMatrix {
         let all = 0..self.runs.len();
         wide(
             #[inline(always)]
-            || self.fill((geometry.directions(), &zeros), all, column, true),
+            || self.fill((geometry.directions(), &zeros), all, column),
         );
         self.lacks_values = false;
-        self.kept += 1;
     }
 
-    /// Whether all values are of the present positions and contacts.
+    /// Whether all values are of these positions and contacts.
     pub(crate) fn is_complete(&self) -> bool {
         !self.lacks_values
     }
@@ -148,19 +144,19 @@ impl ContactMatrix {
     }
 
     /// Whether there are two threads, and work for both.
-    pub(super) fn is_for_two(&self) -> bool {
+    pub(crate) fn is_for_two(&self) -> bool {
         are_two_for(self.len())
     }
 
     /// One stretch of particles after the other, so that what is computed stays near: the directions that a block needs are
     /// those of its own stretch or of one before.
-    fn refresh_by_one(
+    fn assemble_by_one(
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
         mut column: Column<'_>,
     ) -> f64 {
-        let (sorted, keep) = (self.sorted_contacts(), self.keeps_values);
+        let sorted = self.sorted_contacts();
         let in_single = matches!(column, Column::Single(_));
         let stretches = core::mem::take(&mut self.stretches);
         let largest = wide(
@@ -178,14 +174,14 @@ impl ContactMatrix {
                     part.refresh(packing, &pairs[own.clone()]);
                     largest = largest.max(self.largest_overlap(geometry, own.clone()));
                     if in_single {
-                        self.look(geometry, forces, own);
+                        self.compute_operands(geometry, forces, own);
                     }
                     let at = (geometry.directions(), forces);
-                    self.fill(at, runs[0]..runs[1], &mut column, keep);
+                    self.fill(at, runs[0]..runs[1], &mut column);
                 }
                 let all = self.runs.len();
                 let at = (geometry.directions(), forces);
-                self.fill(at, self.sorted..all, &mut column, keep);
+                self.fill(at, self.sorted..all, &mut column);
                 largest
             },
         );
@@ -195,37 +191,37 @@ impl ContactMatrix {
 
     /// What single precision knows of some contacts.
     #[inline(always)]
-    fn look(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
-        let seen = Seen {
-            sights: &mut self.sights[contacts.clone()],
+    fn compute_operands(&mut self, geometry: &Geometry, forces: &[f64], contacts: Range<usize>) {
+        let operands = Operands {
+            operands: &mut self.operands[contacts.clone()],
             loads: &mut self.loads[contacts.clone()],
         };
         let of = [&self.diagonal[..], &self.scaling, forces];
-        seen.look(geometry.directions(), of, contacts, self.units);
+        operands.compute(geometry.directions(), of, contacts, self.units);
     }
 
-    /// [`look`](Self::look) at all contacts, the first `half` of them and the others.
-    fn look_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
+    /// [`compute_operands`](Self::compute_operands) at all contacts, the first `half` of them and the others.
+    fn compute_operands_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
         let (of, units) = ([&self.diagonal[..], &self.scaling, forces], self.units);
-        let (sights, more_sights) = self.sights.split_at_mut(half);
+        let (operands, more_operands) = self.operands.split_at_mut(half);
         let (loads, more_loads) = self.loads.split_at_mut(half);
-        let look = |seen: Seen<'_>, contacts: Range<usize>| {
+        let compute = |operands: Operands<'_>, contacts: Range<usize>| {
             wide(
                 #[inline(always)]
-                || seen.look(geometry.directions(), of, contacts, units),
+                || operands.compute(geometry.directions(), of, contacts, units),
             );
         };
-        let one = Seen { sights, loads };
-        let other = Seen {
-            sights: more_sights,
+        let one = Operands { operands, loads };
+        let other = Operands {
+            operands: more_operands,
             loads: more_loads,
         };
         let all = of[0].len();
-        both(true, || look(one, 0..half), || look(other, half..all));
+        both(true, || compute(one, 0..half), || compute(other, half..all));
     }
 
     /// Half of the directions each, then half of the entries each.
-    fn refresh_by_two(
+    fn assemble_by_two(
         &mut self,
         geometry: &mut Geometry,
         (packing, pairs, forces): (&Packing, &[[u32; 2]], &[f64]),
@@ -246,10 +242,9 @@ impl ContactMatrix {
         );
         let (middle, all, length) = (self.middle(), self.runs.len(), self.len());
         if matches!(column, Column::Single(_)) {
-            self.look_by_two(geometry, forces, half);
+            self.compute_operands_by_two(geometry, forces, half);
         }
-        let keep = self.keeps_values;
-        let (layout, [mut one, mut other]) = self.halves(middle, keep);
+        let (layout, [mut one, mut other]) = self.halves(middle);
         let fill = |runs: Range<usize>, out: &mut Filled<'_>, column: &mut Column<'_>| {
             wide(
                 #[inline(always)]
@@ -274,7 +269,7 @@ impl ContactMatrix {
     }
 
     /// What the blocks are made from, and where they go: those of the first `middle` runs, and the others.
-    fn halves(&mut self, middle: usize, keep: bool) -> (Layout<'_>, [Filled<'_>; 2]) {
+    fn halves(&mut self, middle: usize) -> (Layout<'_>, [Filled<'_>; 2]) {
         let all = self.scaled.len();
         let first = self.runs.get(middle).map_or(all, |run| run.value);
         let layout = Layout {
@@ -283,43 +278,37 @@ impl ContactMatrix {
             end: &self.end,
             scale: &self.scale,
             scaling: &self.scaling,
-            sights: &self.sights,
+            operands: &self.operands,
             loads: &self.loads,
             units: self.units,
         };
         let (scaled, more_scaled) = self.scaled.split_at_mut(first);
-        let (value, more_values) = keep.then(|| self.value.split_at_mut(first)).unzip();
-        let [room, more_room] = &mut self.rooms;
+        let (value, more_values) = self.value.split_at_mut(first);
+        let [scratch, more_scratch] = &mut self.scratch;
         let one = Filled {
             first: 0,
             value,
             scaled,
-            room,
+            scratch,
         };
         let other = Filled {
             first,
             value: more_values,
             scaled: more_scaled,
-            room: more_room,
+            scratch: more_scratch,
         };
         (layout, [one, other])
     }
 
     /// The values of some runs, scaled and not, and their products with the forces.
     #[inline(always)]
-    fn fill(
-        &mut self,
-        at: (Directions<'_>, &[f64]),
-        runs: Range<usize>,
-        column: &mut Column<'_>,
-        keep: bool,
-    ) {
+    fn fill(&mut self, at: (Directions<'_>, &[f64]), runs: Range<usize>, column: &mut Column<'_>) {
         let all = self.runs.len();
-        let (layout, [mut all, _]) = self.halves(all, keep);
+        let (layout, [mut all, _]) = self.halves(all);
         layout.fill(at, runs, &mut all, column);
     }
 
-    /// The largest `|δ|` (length) of some contacts, leaving out those at rest.
+    /// The largest `|δ|` (length) of some contacts, leaving out the inactive ones.
     #[inline(always)]
     pub(crate) fn largest_overlap(&self, geometry: &Geometry, contacts: Range<usize>) -> f64 {
         let larger = |m: f64, x: f64| if x > m { x } else { m };
@@ -338,15 +327,15 @@ impl ContactMatrix {
 }
 
 /// Columns of what single precision knows of some contacts.
-struct Seen<'a> {
-    sights: &'a mut [Sight],
+struct Operands<'a> {
+    operands: &'a mut [Operand],
     loads: &'a mut [f32],
 }
 
-impl Seen<'_> {
+impl Operands<'_> {
     /// From the directions of the `contacts`, and the columns of diagonal, scaling and forces of all.
     #[inline(always)]
-    fn look(
+    fn compute(
         self,
         Directions { normals, angles }: Directions<'_>,
         of: [&[f64]; 3],
@@ -363,8 +352,8 @@ impl Seen<'_> {
             *load = (f * (a * s * inverse)) as f32;
         }
         let directions = normals[contacts.clone()].iter().zip(&angles[contacts]);
-        for ((sight, s), (n, angle)) in self.sights.iter_mut().zip(scaling).zip(directions) {
-            *sight = Sight::of((-n.x, -n.y), *angle, s * units.root);
+        for ((operand, s), (n, angle)) in self.operands.iter_mut().zip(scaling).zip(directions) {
+            *operand = Operand::of((-n.x, -n.y), *angle, s * units.root);
         }
     }
 }
@@ -380,20 +369,20 @@ impl Layout<'_> {
         column: &mut Column<'_>,
     ) {
         match column {
-            Column::Double(products) => self.fill_in_double(at, runs, out, products),
-            Column::Single(products) => self.fill_in_single(runs, out, products),
+            Column::Double(products) => self.assemble_f64(at, runs, out, products),
+            Column::Single(products) => self.assemble_f32(runs, out, products),
         }
     }
 
     #[inline(always)]
-    fn fill_in_double(
+    fn assemble_f64(
         self,
         (directions, forces): (Directions<'_>, &[f64]),
         runs: Range<usize>,
         out: &mut Filled<'_>,
         products: &mut [f64],
     ) {
-        let Room { toward, values, .. } = &mut *out.room;
+        let toward = &mut out.scratch.toward;
         for run in &self.runs[runs] {
             let ends = &self.end[run.ends()];
             // Nothing that is called here may be left to a function of its own, which would not be compiled for wide vectors.
@@ -404,16 +393,10 @@ impl Layout<'_> {
                 *toward = directions.toward(*end);
             }
             let own = run.values().start - out.first..run.values().end - out.first;
-            if values.len() < own.len() {
-                values.resize(own.len(), 0.0);
-            }
             let blocks = Blocks {
                 toward,
                 ends,
-                values: match &mut out.value {
-                    Some(value) => &mut value[own.clone()],
-                    None => &mut values[..own.len()],
-                },
+                values: &mut out.value[own.clone()],
                 scaled: &mut out.scaled[own],
                 scaling: self.scaling,
                 forces,
@@ -435,17 +418,17 @@ impl Layout<'_> {
     }
 
     #[inline(always)]
-    fn fill_in_single(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
+    fn assemble_f32(self, runs: Range<usize>, out: &mut Filled<'_>, products: &mut [f32]) {
         let per_radius = 1.0 / (self.units.root * self.units.root);
         for run in &self.runs[runs] {
             let own = run.values().start - out.first..run.values().end - out.first;
-            let blocks = SingleBlocks {
+            let blocks = BlocksF32 {
                 ends: &self.end[run.ends()],
-                sights: self.sights,
+                operands: self.operands,
                 loads: self.loads,
                 scaled: &mut out.scaled[own],
                 products,
-                room: &mut out.room.lanes,
+                scratch: &mut out.scratch.lanes,
             };
             let particles = &self.particle[run.block..run.block + run.count];
             let radii = particles
@@ -453,13 +436,13 @@ impl Layout<'_> {
                 .map(|p| (self.scale[*p as usize] * per_radius) as f32);
             match run.size {
                 1 => {}
-                2 => fill_single::<2, 1>(blocks, radii),
-                3 => fill_single::<3, 3>(blocks, radii),
-                4 => fill_single::<4, 6>(blocks, radii),
-                5 => fill_single::<5, 10>(blocks, radii),
-                6 => fill_single::<6, 15>(blocks, radii),
-                7 => fill_single::<7, 21>(blocks, radii),
-                z => fill_single_blocks(z, blocks, radii),
+                2 => fill_f32::<2, 1>(blocks, radii),
+                3 => fill_f32::<3, 3>(blocks, radii),
+                4 => fill_f32::<4, 6>(blocks, radii),
+                5 => fill_f32::<5, 10>(blocks, radii),
+                6 => fill_f32::<6, 15>(blocks, radii),
+                7 => fill_f32::<7, 21>(blocks, radii),
+                z => fill_f32_blocks(z, blocks, radii),
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Tests: a law that has gone a long way and one that is taken up at its last answer go on alike, to the last bit.
 
-use super::law::{ContactLaw, Rule};
-use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry};
-use super::product::Products;
-use super::solver::{ConjugateGradient, Method};
+use super::{ContactLaw, Rule};
 use crate::analysis::{Backbone, Observables};
 use crate::contacts::net_forces;
 use crate::domain::{Domain, Vec2};
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::product::Products;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
+use crate::models::droplet::contact::solver::{ConjugateGradient, Method};
 use crate::protocol::Relaxation;
 use crate::scene::Scene;
 use crate::state::Packing;
@@ -185,7 +185,7 @@ fn cluster(push: f64, near: &[(f64, f64)]) -> Packing {
 }
 
 #[test]
-fn mend_that_adds_many_contacts_leaves_a_law_that_agrees_with_itself() {
+fn local_update_that_adds_many_contacts_leaves_a_law_that_agrees_with_itself() {
     let near = [(1.3, 1e-4), (-1.3, 1e-4)];
     let (before, after) = (cluster(0.0, &near), cluster(0.02, &near));
     let mut run = law(1.0, 1e-6);
@@ -198,20 +198,23 @@ fn mend_that_adds_many_contacts_leaves_a_law_that_agrees_with_itself() {
     again.restore(&before, &pairs, &forces);
     run.solve_again(&after).unwrap();
     again.solve_again(&after).unwrap();
-    assert!(run.work().patches > 0 && run.contacts().pairs.len() >= pairs.len() + 3);
+    assert!(run.work().local_updates > 0 && run.contacts().pairs.len() >= pairs.len() + 3);
     assert_same(&run, &again, &after, &mut Backbone::default());
 }
 
 #[test]
-fn contact_that_a_mend_wakes_is_there_in_single_precision_too() {
+fn contact_that_a_local_update_activates_is_there_in_single_precision_too() {
     let near = [(1.3, -0.02)];
     let (one, two) = (cluster(0.03, &near), cluster(-0.03, &near));
     let mut run = law(1.0, 1e-6);
     run.solve(&one, &[], &[]).unwrap();
     run.solve_again(&two).unwrap();
-    assert!(!run.is_in_order(), "a contact is at rest");
+    assert!(!run.set.is_ordered(), "a contact is inactive");
     run.solve_again(&one).unwrap();
-    assert!(run.is_in_order() && run.work().structures < 3, "and woken");
+    assert!(
+        run.set.is_ordered() && run.work().structures < 3,
+        "and active again"
+    );
     let count = run.contacts().pairs.len();
     let b: Vec<f64> = (0..count)
         .map(|k| 0.01 * libm::sin(0.7 * k as f64))

@@ -1,4 +1,4 @@
-//! The loops that compute the blocks of [`ContactMatrix`](super::matrix::ContactMatrix), one for each size.
+//! The loops that compute the blocks of [`ContactMatrix`](super::ContactMatrix), one for each size.
 //!
 //! Whatever a run of blocks is needed for at new positions is done while its entries are near: its values, the same in single
 //! precision and without units, and the products with the forces. One simple loop each: a single loop for all is slower.

@@ -3,11 +3,11 @@
 //! # The way to the answer
 //!
 //! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set
-//! with a negative gap ought to come. [`Rule::Complementarity`](super::Rule::Complementarity) exchanges them all at once and solves again, which
+//! with a negative gap ought to come. [`Rule::Complementarity`](crate::models::droplet::contact::Rule::Complementarity) exchanges them all at once and solves again, which
 //! takes one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
-//! (1994)): when three sweeps have not lowered the number of offending pairs below its best, only the *first* offending
+//! (1994)): when three sweeps have not lowered the number of violating pairs below its best, only the *first* violating
 //! pair in the order of the list is exchanged, until the number falls below its best. With the first pair alone the
 //! sequence is Murty's (K. G. Murty, Opsearch 11, 54 (1974)), which reaches the answer of a problem whose matrix is
 //! positive definite in finitely many exchanges; so the best number falls again and again, down to zero.
@@ -22,20 +22,20 @@
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
-use super::error::ContactError;
-use super::images::{Loaded, second_image};
-use super::law::ContactLaw;
-use super::matrix::Precision;
-use super::product::First;
-use super::search::At;
-use super::sight::rounding;
-use super::solver::{LinearSolver, Progress, SolverError};
-use super::tolerance::ACCEPTED;
+use super::ContactLaw;
+use crate::models::droplet::contact::error::ContactError;
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::Precision;
+use crate::models::droplet::contact::matrix::rounding;
+use crate::models::droplet::contact::search::Conditions;
+use crate::models::droplet::contact::second_image::{Loaded, second_image};
+use crate::models::droplet::contact::solver::{LinearSolver, Progress, SolverError};
+use crate::models::droplet::contact::tolerance::ACCEPTED;
 use crate::numerics::threads::both;
 use crate::numerics::wide::wide;
 use crate::state::Packing;
 
-/// The widest bulge that candidates are looked for with, in units of the largest radius. At φ = 1.3 bulges are below one.
+/// The widest bulge that candidates are looked for with, in units of the largest radius. Conditions φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
 
 /// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
@@ -46,14 +46,14 @@ const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Offence {
+pub(in crate::models::droplet::contact) enum Violation {
     /// Contact number `.0` pulls.
     Drop(usize, [u32; 2]),
     /// This pair overlaps and has no force; `.1` is a first guess of it.
     Add([u32; 2], f64),
 }
 
-impl Offence {
+impl Violation {
     pub(super) fn pair(self) -> [u32; 2] {
         match self {
             Self::Drop(_, pair) | Self::Add(pair, _) => pair,
@@ -62,24 +62,24 @@ impl Offence {
 }
 
 impl ContactLaw {
-    /// Exchanges contacts until none offends.
+    /// Exchanges contacts until no pair violates the law.
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
         let most = 1000 + 20 * packing.len();
-        let (mut best, mut mends) = (usize::MAX, 3);
+        let (mut best, mut updates) = (usize::MAX, 3);
         self.precision = self.precision_for(packing);
         let mut patience = PATIENCE;
         for _ in 0..most {
             self.sweep(packing)?;
-            let count = self.offending.len();
+            let count = self.violations.len();
             if count == 0 {
                 return Ok(());
             }
-            if mends > 0 && self.is_mendable() {
-                mends -= 1;
-                if self.mend(packing) {
+            if updates > 0 && self.is_local() {
+                updates -= 1;
+                if self.update_locally(packing) {
                     self.assemble(packing);
-                    let (scale, worst) = (self.scale(), self.off.max(self.tolerated));
+                    let (scale, worst) = (self.scale(), self.equation.max(self.tolerated));
                     self.residual = if scale > 0.0 { worst / scale } else { worst };
                     return Ok(());
                 }
@@ -97,8 +97,8 @@ impl ContactLaw {
             }
         }
         Err(ContactError::Unsettled {
-            offending: self.offending.len(),
-            contacts: self.contact_count(),
+            offending: self.violations.len(),
+            contacts: self.set.active(),
             sweeps: most,
         })
     }
@@ -114,51 +114,51 @@ impl ContactLaw {
         }
     }
 
-    /// Whether few contacts offend, and the tolerance is one that a sum of residuals may be held against.
-    fn is_mendable(&self) -> bool {
+    /// Whether few pairs violate the law, and the tolerance is one that a sum of residuals may be held against.
+    fn is_local(&self) -> bool {
         let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
-            && 64 * self.offending.len() <= self.contact_count()
+            && 64 * self.violations.len() <= self.set.active()
     }
 
-    /// Forces of the present set, and the pairs that offend, in the order of the list.
+    /// Forces of the set, and the pairs that violate the law, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
         let multiplied = self.assemble(packing);
         let iterations = self.find_forces(packing, multiplied)?;
         self.work.iterations += iterations as u64;
         match self.solver.largest_residual() {
-            Some(largest) => self.off = largest,
+            Some(largest) => self.equation = largest,
             None => self.measure_equation(),
         }
         self.inspect(packing);
         Ok(())
     }
 
-    /// Solves `A f = δ` of the present set; returns the iterations. `multiplied` says that `products` are of the present forces.
+    /// Solves `A f = δ` of the set; returns the iterations. `multiplied` says that `products` are of the forces.
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
         let scale = self.scale();
         let tolerance = self.allowed(scale);
         let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
         let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
-        self.matrix.keeps_values = direct || !loosely;
         let in_single = self.precision == Precision::Single;
         if !multiplied && in_single {
             let (geometry, products) = (&self.geometry, &mut self.products);
-            self.matrix.fill_in_single(geometry, &self.forces, products);
+            self.matrix
+                .assemble_f32(geometry, self.set.forces(), products);
         } else if direct || !multiplied {
             self.matrix.complete(&self.geometry);
         }
-        let (overlaps, forces) = (self.geometry.overlaps(), &mut self.forces[..]);
+        let (overlaps, forces) = (self.geometry.overlaps(), self.set.forces_mut());
         let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
             return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
         };
         let goal = (tolerance, loosely);
         let products = if in_single {
-            Some(First::Single(self.products.single.sums()))
+            Some(self.products.single())
         } else {
-            multiplied.then_some(First::Double(self.products.double.sums()))
+            multiplied.then(|| self.products.double())
         };
         let from = (products, 0);
         let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
@@ -178,59 +178,53 @@ impl ContactLaw {
             return Ok(iterations);
         };
         let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
-        solver.finish(matrix, overlaps, &mut self.forces, tolerance, iterations)
+        let forces = self.set.forces_mut();
+        solver.finish(matrix, overlaps, forces, tolerance, iterations)
     }
 
-    /// Geometry and matrix of the present set at the present positions; what still stands is not done again. Says whether it was
-    /// not, and `products` are those of the off-diagonal entries of `A` with the present forces.
+    /// Geometry and matrix of the set at these positions; what still stands is not done again. Says whether it was
+    /// not, and `products` are those of the off-diagonal entries of `A` with the forces.
     pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
-        if !self.refreshed && self.is_untidy() {
+        if !self.assembled && self.is_untidy() {
             self.put_in_order(&[]);
         }
         if !self.structured {
-            self.list.rebuild(packing.len(), &self.pairs);
+            let mut list = ContactList::default();
+            list.rebuild(packing.len(), self.set.pairs());
             self.work.structures += 1;
-            self.geometry.restructure(&self.list);
+            self.geometry.restructure(&list);
             let duplicate = self.geometry.duplicate();
             self.matrix
-                .restructure(packing, &self.list, duplicate, self.line_tension);
+                .restructure(packing, &list, duplicate, self.line_tension);
         }
-        let anew = !(self.structured && self.refreshed);
+        let anew = !(self.structured && self.assembled);
         if anew {
             let (geometry, products) = (&mut self.geometry, &mut self.products);
-            let at = (packing, &self.pairs[..], &self.forces[..]);
-            self.scale = self.matrix.refresh(geometry, at, products, self.precision);
+            let at = (packing, self.set.pairs(), self.set.forces());
+            self.scale = self.matrix.assemble(geometry, at, products, self.precision);
             self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
-            (self.structured, self.refreshed) = (true, true);
+            (self.structured, self.assembled) = (true, true);
         }
         anew
     }
 
     /// Whether so many contacts have left or come since the structure was built that it is time for a new one.
     fn is_untidy(&self) -> bool {
-        16 * self.at_rest.len() > self.pairs.len() + 256
-            || 64 * self.matrix.stragglers() > self.pairs.len() + 1024
+        16 * self.set.inactive().len() > self.set.len() + 256
+            || 64 * self.matrix.stragglers() > self.set.len() + 1024
     }
 
     /// Numbers the contacts in the order of pairs, without those that have left and with those that `came`; their structure
     /// is to be built.
     fn put_in_order(&mut self, came: &[([u32; 2], f64)]) {
-        if came.is_empty() && self.is_in_order() {
+        if came.is_empty() && self.set.is_ordered() {
             return;
         }
-        let numbered = self.pairs.iter().zip(&self.forces);
-        let in_contact = numbered.zip(self.matrix.scaling());
-        let in_contact = in_contact.filter(|(_, scaling)| **scaling > 0.0);
-        let known = in_contact.map(|((pair, force), _)| (*pair, *force));
-        let mut contacts: Vec<_> = known.chain(came.iter().copied()).collect();
-        // Most ascend already.
-        contacts.sort_by_key(|c| c.0);
-        (self.pairs, self.forces) = contacts.into_iter().unzip();
-        self.at_rest.clear();
-        self.added.clear();
+        self.set.sort(came);
+        self.candidates.forget();
         self.bulges.forget();
-        (self.structured, self.parted) = (false, false);
+        self.structured = false;
     }
 
     /// The largest `|δ|`, the scale of all residuals.
@@ -238,26 +232,26 @@ impl ContactLaw {
         self.scale
     }
 
-    /// `max |A f − δ|` of the present forces.
+    /// `max |A f − δ|` of the forces.
     pub(super) fn measure_equation(&mut self) {
-        self.image.resize(self.forces.len(), 0.0);
+        self.image.resize(self.set.len(), 0.0);
         self.matrix.complete(&self.geometry);
-        self.matrix.multiply(&self.forces, &mut self.image);
-        self.off = 0.0;
+        self.matrix.multiply(self.set.forces(), &mut self.image);
+        self.equation = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
         for ((q, d), s) in rows.zip(self.matrix.scaling()) {
             if *s > 0.0 {
-                self.off = self.off.max((d - q).abs());
+                self.equation = self.equation.max((d - q).abs());
             }
         }
     }
 
-    /// Measures how far the present forces are from the contact law, and lists the pairs that offend.
+    /// Measures how far the forces are from the contact law, and lists the pairs that violate it.
     pub(super) fn inspect(&mut self, packing: &Packing) {
         let scale = self.scale();
         self.bound_bulges(packing);
         let tolerance = self.passed_over(scale);
-        let worst = self.off.max(self.find_offences(packing, tolerance));
+        let worst = self.equation.max(self.find_violations(packing, tolerance));
         self.residual = if scale > 0.0 { worst / scale } else { worst };
     }
 
@@ -265,7 +259,7 @@ impl ContactLaw {
     fn bound_bulges(&mut self, packing: &Packing) {
         let widest = WIDEST_BULGE * packing.largest_radius();
         let per_radius = self.per_radius();
-        let (pairs, forces) = (&self.pairs[..], &self.forces[..]);
+        let (pairs, forces) = (self.set.pairs(), self.set.forces());
         self.bulges
             .bound(pairs, forces, packing.radii(), per_radius);
         // The forces of an unfinished exchange can be anything; pairs beyond the widest bulge are left to a later sweep.
@@ -279,20 +273,7 @@ impl ContactLaw {
             };
             self.diverged = self.bulges.cut(widest, |p| loaded.bulge(p));
         }
-        self.cover(packing, self.bulges.largest());
-    }
-
-    /// A neighbour list that covers bulges up to `largest`.
-    pub(super) fn cover(&mut self, packing: &Packing, largest: f64) {
-        let skin = 0.3 * packing.ample_radius();
-        let moved = core::mem::replace(&mut self.moved, 0.0);
-        if self
-            .neighbors
-            .update_after(packing, 2.0 * largest, skin + largest, moved)
-        {
-            self.parted = false;
-        }
-        self.covered = largest;
+        self.candidates.cover(packing, self.bulges.largest());
     }
 
     /// An answer that leaves out a second image of a neighbour, or that bulges without bound, is none.
@@ -303,18 +284,18 @@ impl ContactLaw {
             return Ok(());
         }
         debug_assert!(
-            self.bulges.largest() <= self.covered,
+            self.bulges.largest() <= self.candidates.covered(),
             "pairs in reach are listed"
         );
         let tolerance = ACCEPTED * self.allowed(self.scale());
         let loaded = Loaded {
             packing,
             geometry: &self.geometry,
-            forces: &self.forces,
+            forces: self.set.forces(),
             per_radius: self.per_radius(),
         };
         if let Some((particle, other)) =
-            second_image(loaded, self.neighbors.pairs(), reach, tolerance)
+            second_image(loaded, self.candidates.within_reach(), reach, tolerance)
         {
             return Err(ContactError::BoxTooSmall {
                 particle,
@@ -333,33 +314,18 @@ impl ContactLaw {
         Ok(())
     }
 
-    /// The pairs of the neighbour list that are not in the set.
-    pub(super) fn part(&mut self) {
-        if self.parted {
-            return;
-        }
-        self.others.clear();
-        let in_order = self.pairs.len() - self.added.len();
-        let mut contacts = self.pairs[..in_order].iter().peekable();
-        self.added.sort_unstable();
-        // All ascend.
-        for &pair in self.neighbors.pairs() {
-            while contacts.next_if(|c| **c < pair).is_some() {}
-            if contacts.peek() != Some(&&pair) && self.added.binary_search(&pair).is_err() {
-                self.others.push(pair);
-            }
-        }
-        self.parted = true;
-    }
-
-    /// Lists the pairs that offend by more than `tolerance` (length); returns the largest offence, below it or above.
-    fn find_offences(&mut self, packing: &Packing, tolerance: f64) -> f64 {
-        self.part();
-        self.offending.clear();
+    /// Lists the pairs that violate the law by more than `tolerance` (length); returns the largest violation, below it or above.
+    fn find_violations(&mut self, packing: &Packing, tolerance: f64) -> f64 {
+        self.candidates.list(&self.set);
+        self.violations.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
         let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
-        let rows = self.forces.chunks(64).zip(self.matrix.scaling().chunks(64));
+        let rows = self
+            .set
+            .forces()
+            .chunks(64)
+            .zip(self.matrix.scaling().chunks(64));
         for (k, (forces, scaling)) in rows.enumerate() {
             let rows = || forces.iter().zip(scaling);
             let any = wide(
@@ -371,84 +337,85 @@ impl ContactLaw {
             }
             for (contact, (&f, &s)) in (64 * k..).zip(rows()) {
                 if pulls(f, s) {
-                    self.offending
-                        .push(Offence::Drop(contact, self.pairs[contact]));
+                    self.violations
+                        .push(Violation::Drop(contact, self.set.pairs()[contact]));
                     worst = worst.max(-f * self.matrix.diagonal()[contact]);
                 }
             }
         }
-        self.work.distances += (self.others.len() + self.at_rest.len()) as u64;
-        let at = At {
+        let candidates = self.candidates.pairs();
+        self.work.distances += (candidates.len() + self.set.inactive().len()) as u64;
+        let at = Conditions {
             packing,
             line_tension: self.line_tension,
             geometry: &self.geometry,
-            forces: &self.forces,
+            forces: self.set.forces(),
             bulges: &self.bulges,
             per_radius: self.per_radius(),
             tolerance,
         };
-        let at_rest = self.at_rest.iter().map(|c| self.pairs[*c as usize]);
+        let inactive = self.set.inactive_pairs();
         let two = self.matrix.is_for_two();
-        let half = if two { self.others.len() / 2 } else { 0 };
-        let (some, more) = self.others.split_at(half);
+        let half = if two { candidates.len() / 2 } else { 0 };
+        let (some, more) = candidates.split_at(half);
         let [one, other] = &mut self.searches;
         both(
             two,
             || one.look_at(at, some.iter().copied()),
-            || other.look_at(at, more.iter().copied().chain(at_rest)),
+            || other.look_at(at, more.iter().copied().chain(inactive)),
         );
         for search in &self.searches {
-            self.work.gaps += search.near.len() as u64;
-            self.offending.extend_from_slice(&search.found);
-            worst = worst.max(search.worst);
-            self.tolerated = self.tolerated.max(search.tolerated);
+            self.work.gaps += search.gaps();
+            self.violations.extend_from_slice(search.violations());
+            worst = worst.max(search.worst());
+            self.tolerated = self.tolerated.max(search.tolerated());
         }
-        self.offending
-            .sort_unstable_by_key(|offence| offence.pair());
+        self.violations
+            .sort_unstable_by_key(|violation| violation.pair());
         worst
     }
 
-    /// Exchanges the first `count` offending pairs between the two sides.
+    /// Exchanges the first `count` violating pairs between the two sides.
     ///
-    /// A contact that leaves is laid to rest where it is, and one that comes back is woken; others are added behind those
+    /// A contact that leaves becomes inactive where it is, and one that comes back becomes active; others are added behind those
     /// that there are. Neither touches the rest of the structure.
     pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
-        debug_assert!(self.offending.windows(2).all(|w| w[0].pair() < w[1].pair()));
+        debug_assert!(
+            self.violations
+                .windows(2)
+                .all(|w| w[0].pair() < w[1].pair())
+        );
         let mut came: Vec<([u32; 2], f64)> = Vec::new();
         let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
         for at in 0..count {
-            let offence = self.offending[at];
-            self.note(offence.pair(), matches!(offence, Offence::Add(..)));
-            match offence {
-                Offence::Drop(contact, _) => {
+            let violation = self.violations[at];
+            self.note(violation.pair(), matches!(violation, Violation::Add(..)));
+            match violation {
+                Violation::Drop(contact, _) => {
                     left = left.max(self.geometry.overlaps()[contact].abs());
-                    self.forces[contact] = 0.0;
-                    self.at_rest.push(contact as u32);
-                    self.matrix.set_at_rest(contact, true);
+                    self.set.deactivate(contact);
+                    self.matrix.deactivate(contact);
                 }
-                Offence::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
+                Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
                     Some(contact) => {
                         joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
-                        self.forces[contact as usize] = guess;
-                        self.at_rest.retain(|c| *c != contact);
-                        self.matrix.set_at_rest(contact as usize, false);
+                        self.set.activate(contact as usize, guess);
+                        self.matrix.activate(contact as usize);
                     }
                     None => came.push((pair, guess)),
                 },
             }
         }
         if !matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            || 32 * came.len() > self.pairs.len()
+            || 32 * came.len() > self.set.len()
         {
             self.put_in_order(&came);
             return;
         }
         for &(pair, guess) in &came {
-            self.pairs.push(pair);
-            self.forces.push(guess);
-            self.added.push(pair);
+            self.set.add(pair, guess);
             self.geometry.add(packing, pair);
-            joined = joined.max(self.geometry.overlaps()[self.pairs.len() - 1].abs());
+            joined = joined.max(self.geometry.overlaps()[self.set.len() - 1].abs());
             let duplicate = self.geometry.duplicate();
             self.matrix.add(packing, duplicate, pair, self.line_tension);
         }
@@ -457,16 +424,9 @@ impl ContactLaw {
             self.scale = self.matrix.largest_overlap(&self.geometry, all);
         }
         self.scale = self.scale.max(joined);
-        if self.is_in_order() {
+        if self.set.is_ordered() {
             self.matrix.make_whole();
         }
-        // Both ascend.
-        let mut came = came.iter().map(|c| c.0).peekable();
-        if came.peek().is_some() {
-            self.others.retain(|pair| {
-                while came.next_if(|c| c < pair).is_some() {}
-                came.peek() != Some(pair)
-            });
-        }
+        self.candidates.remove(came.iter().map(|c| c.0));
     }
 }

@@ -1,4 +1,4 @@
-//! The loops over the blocks of [`ContactMatrix`](super::matrix::ContactMatrix), one for each size.
+//! The loops over the blocks of [`ContactMatrix`](super::ContactMatrix), one for each size.
 //!
 //! A block names its contacts by their ends, `2c` or `2c + 1` for contact `c`.
 
@@ -74,11 +74,23 @@ pub(crate) enum First<'a> {
     Single(&'a [f32]),
 }
 
-/// Room for the products with the forces.
+/// The products with the forces, in the precision that they were made in last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FirstProducts {
     pub(super) double: Products<f64>,
     pub(super) single: Products<f32>,
+}
+
+impl FirstProducts {
+    /// Those in double precision.
+    pub(crate) fn double(&self) -> First<'_> {
+        First::Double(self.double.sums())
+    }
+
+    /// Those in single precision.
+    pub(crate) fn single(&self) -> First<'_> {
+        First::Single(self.single.sums())
+    }
 }
 
 /// `y += A x` of blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each.

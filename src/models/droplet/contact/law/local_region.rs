@@ -1,14 +1,19 @@
-//! A patch of contacts on which the forces are corrected: see [`mend`](super::mend).
+//! A region of contacts on which the forces are corrected: see [`local_update`](super::local_update).
+//!
+//! - A contact's number is that of the set; contacts that came in this local update follow behind.
+//! - `place` of a contact is its row in `rows` and `contacts`, or `NOWHERE`, or `GONE` if it is inactive.
+//! - A particle with a block has all its active contacts in the region; a contact may have one particle without.
+//! - Between local updates the region is empty, every `place` is `NOWHERE` and every `left_of` is 0.
 
-use super::blocks::compliance;
-use super::geometry::Geometry;
+use crate::models::droplet::contact::geometry::Geometry;
+use crate::models::droplet::contact::matrix::compliance;
 use crate::models::droplet::kernel::Direction;
 use crate::state::Packing;
 
 /// Iterations that are tried.
 const ITERATIONS: usize = 40;
 
-/// A contact that is in no patch, and one that has left the set.
+/// A contact that is in no region, and one that has left the set.
 pub(super) const NOWHERE: u32 = u32::MAX;
 pub(super) const GONE: u32 = u32::MAX - 1;
 
@@ -30,18 +35,19 @@ impl Added {
     }
 }
 
-/// The patch, and the exchanges of the mend that it belongs to. A contact's number is that of the law; those that come in this mend
-/// follow behind.
+/// The region, and the exchanges of the local update that it belongs to.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Patch {
-    /// Where each contact is in the patch, or one of the marks.
+pub(super) struct LocalRegion {
+    /// The forces of all contacts with the exchanges that were made.
+    pub(super) forces: Vec<f64>,
+    /// Where each contact is in the region, or one of the marks.
     pub(super) place: Vec<u32>,
     /// The contacts that have left.
     pub(super) gone: Vec<u32>,
     added: Vec<Added>,
     /// `(particle, partner, number in added)`, ascending.
     pub(super) added_of: Vec<[u32; 3]>,
-    /// The block of each particle, [`NOWHERE`] if it is not in the patch, and the particles of the blocks.
+    /// The block of each particle, [`NOWHERE`] if it is not in the region, and the particles of the blocks.
     pub(super) block: Vec<u32>,
     pub(super) particles: Vec<u32>,
     /// Where the members of each particle's block end.
@@ -49,16 +55,16 @@ pub(super) struct Patch {
     /// Places of the blocks' contacts, and their directions.
     pub(super) member: Vec<u32>,
     pub(super) toward: Vec<Direction>,
-    /// The blocks' entries of `A`, as in [`ContactMatrix`](super::matrix::ContactMatrix).
+    /// The blocks' entries of `A`, as in [`ContactMatrix`](crate::models::droplet::contact::matrix::ContactMatrix).
     pub(super) value: Vec<f64>,
-    /// The contacts of the patch, with their vectors.
+    /// The contacts of the region, with their vectors.
     pub(super) contacts: Vec<u32>,
     pub(super) rows: Vec<Row>,
     room: Vec<(usize, Direction)>,
-    /// The particles of the patches of this round, and which they are.
+    /// The particles of the regions of this round, and which they are.
     pub(super) visited: Vec<u32>,
     pub(super) is_visited: Vec<bool>,
-    /// The residual that patches have left at each contact (length), and the contacts where there is any.
+    /// The residual that regions have left at each contact (length), and the contacts where there is any.
     pub(super) left_of: Vec<f64>,
     reached: Vec<u32>,
 }
@@ -73,7 +79,7 @@ pub(super) struct Row {
     correction: f64,
 }
 
-/// What a patch is cut from.
+/// What a region is cut from.
 #[derive(Clone, Copy)]
 pub(super) struct Whole<'a> {
     packing: &'a Packing,
@@ -100,7 +106,7 @@ impl<'a> Whole<'a> {
     }
 }
 
-impl Patch {
+impl LocalRegion {
     /// The number of a pair that came and may have gone again.
     pub(super) fn find(&self, whole: Whole<'_>, pair: [u32; 2]) -> Option<usize> {
         let numbered = whole.geometry.duplicate().find(pair);
@@ -172,7 +178,7 @@ impl Patch {
         around.find(|a| a.1 as usize == contact).map(|a| a.2)
     }
 
-    /// Empties the patch; what was exchanged stays.
+    /// Empties the region; what was exchanged stays.
     pub(super) fn clear(&mut self) {
         for &c in &self.contacts {
             if self.place[c as usize] != GONE {
@@ -198,7 +204,7 @@ impl Patch {
         }
     }
 
-    /// Takes note of where the patch is and of the residual that was `left` there; returns the largest sum of what patches have
+    /// Takes note of where the region is and of the residual that was `left` there; returns the largest sum of what regions have
     /// left at one contact.
     pub(super) fn leave(&mut self, left: f64) -> f64 {
         for &p in &self.particles {
@@ -242,7 +248,7 @@ impl Patch {
         self.added_of.clear();
     }
 
-    /// Takes particle `p` into the patch, with all its contacts.
+    /// Takes particle `p` into the region, with all its contacts.
     fn take_in(&mut self, whole: Whole<'_>, p: u32) {
         if self.block[p as usize] != NOWHERE {
             return;
@@ -309,12 +315,11 @@ impl Patch {
         }
     }
 
-    /// Adds the correction to `forces`; returns the iterations and the largest residual left. Does nothing if the patch
+    /// Adds the correction to the forces; returns the iterations and the largest residual left. Does nothing if the region
     /// outgrows `most` contacts or the iterations do not end.
     pub(super) fn descend(
         &mut self,
         whole: Whole<'_>,
-        forces: &mut [f64],
         tolerance: f64,
         most: usize,
     ) -> Option<(usize, f64)> {
@@ -328,7 +333,7 @@ impl Patch {
             // A NaN hides from the largest entry, but not from the sum.
             if largest <= tolerance && f64::is_finite(rz) {
                 for (row, &c) in self.rows.iter().zip(&self.contacts) {
-                    forces[c as usize] += row.correction;
+                    self.forces[c as usize] += row.correction;
                 }
                 return Some((iteration, largest));
             }

@@ -1,17 +1,31 @@
 //! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
 //!
+//! - Rows are the numbers of the contacts. An inactive contact has a row, whose scaling is 0.
+//! - A particle with contacts has one block; a block names its contacts in the order of the particle's partners.
+//! - The first `sorted` runs hold whole stretches of particles. A block that a contact was added to stands behind them, alone.
+//! - Behind an assembly `scaled` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
+//!
 //! See the example of [`ContactMatrix`].
 
-pub use super::geometry::Geometry;
+mod assemble;
+mod blocks;
+mod entries_f32;
+mod entries_f64;
+pub(crate) mod product;
 
-use super::blocks::{Run, pairs_of};
-use super::list::ContactList;
-use super::product::{Number, Products, product, product_of_blocks};
-use super::refresh::Room;
-use super::sight::Sight;
+pub use crate::models::droplet::contact::geometry::Geometry;
+
+pub(super) use blocks::compliance;
+pub(super) use entries_f32::rounding;
+
+use crate::models::droplet::contact::list::ContactList;
 use crate::numerics::wide::wide;
 use crate::state::Packing;
+use assemble::Scratch;
+use blocks::{Run, pairs_of};
 use core::ops::Range;
+use entries_f32::Operand;
+use product::{Number, Products, product, product_of_blocks};
 
 /// The matrix `A` of `A f = δ`: what Saitoh (6) writes as `𝒦⁻¹`, symmetric and positive definite.
 ///
@@ -48,44 +62,44 @@ use core::ops::Range;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct ContactMatrix {
-    pub(super) diagonal: Vec<f64>,
-    /// `A_cc^(−½)`, and 0 for a contact that is at rest.
-    pub(super) scaling: Vec<f64>,
+    /// `A_cc` (length per force).
+    diagonal: Vec<f64>,
+    /// `A_cc^(−½)`, and 0 for an inactive contact.
+    scaling: Vec<f64>,
     /// A bound of `A_cc^½`.
-    pub(super) largest_root: f64,
-    /// Runs of blocks of one size, and how many of them were sorted.
-    pub(super) runs: Vec<Run>,
-    pub(super) sorted: usize,
+    largest_root: f64,
+    /// Runs of blocks of one size.
+    runs: Vec<Run>,
+    /// How many of the runs were sorted when the structure was built.
+    sorted: usize,
     /// The particle of each block.
-    pub(super) particle: Vec<u32>,
+    particle: Vec<u32>,
     /// The ends of contacts in the blocks: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
-    pub(super) end: Vec<u32>,
+    end: Vec<u32>,
     /// `−R_p/2πγ` of each particle.
-    pub(super) scale: Vec<f64>,
+    scale: Vec<f64>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
-    pub(super) value: Vec<f64>,
-    /// Whether [`refresh`](Self::refresh) keeps them: most steps need no more of them than their products with the forces.
-    pub(super) keeps_values: bool,
-    /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for contacts at rest.
-    pub(super) scaled: Vec<f32>,
-    /// What entries in single precision are made from, and multiplied with in the first place: see [`sight`](super::sight).
-    pub(super) sights: Vec<Sight>,
-    pub(super) loads: Vec<f32>,
-    pub(super) units: Units,
-    /// Whether the values are not those of the present positions and contacts; an empty matrix lacks none.
-    pub(super) lacks_values: bool,
-    /// How often the values were kept.
-    pub(super) kept: u64,
-    /// Room for a run, in each of two threads.
-    pub(super) rooms: [Room; 2],
+    value: Vec<f64>,
+    /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for inactive contacts.
+    scaled: Vec<f32>,
+    /// What entries in single precision are computed from, see [`entries_f32`].
+    operands: Vec<Operand>,
+    /// `A_cc^½ f_c`, in units of `units.load`: what entries in single precision are multiplied with first.
+    loads: Vec<f32>,
+    /// What single precision counts in.
+    units: Units,
+    /// Whether `value` is not of the positions and contacts at hand; an empty matrix lacks none.
+    lacks_values: bool,
+    /// Buffers for a run, one a thread.
+    scratch: [Scratch; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
-    pub(super) stretches: Vec<[usize; 2]>,
+    stretches: Vec<[usize; 2]>,
     /// The block of each particle, [`NO_BLOCK`] where it has no contact.
-    pub(super) block_of: Vec<u32>,
+    block_of: Vec<u32>,
     /// The particles of each contact.
-    pub(super) pairs: Vec<[u32; 2]>,
-    /// Whether contacts were added, or are at rest.
-    pub(super) changed: bool,
+    pairs: Vec<[u32; 2]>,
+    /// Whether a contact was added or is inactive.
+    changed: bool,
 }
 
 /// What entries are computed in.
@@ -103,7 +117,7 @@ pub(super) struct Units {
     pub(super) root: f64,
     /// `A_cc^½ f_c` of a force γ on the largest particles, up to a factor of order 1 (length times force, to the half).
     pub(super) load: f64,
-    /// An estimate of the [rounding](super::sight::rounding) of what entries make of the forces.
+    /// An estimate of the [rounding](entries_f32::rounding) of what entries make of the forces.
     pub(super) rounding: f64,
 }
 

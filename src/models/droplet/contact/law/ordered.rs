@@ -1,12 +1,12 @@
 //! The contacts as they are seen from outside: in the order of pairs, and no other among them. And what can be read off them in
 //! the order of their numbers, with the same bits.
 
-use super::law::ContactLaw;
-use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry};
+use super::ContactLaw;
 use crate::contacts::net_forces;
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
+use crate::models::droplet::contact::list::ContactList;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
 use core::ops::Range;
 use std::sync::OnceLock;
 
@@ -14,10 +14,10 @@ impl ContactLaw {
     /// The contacts and forces found last.
     #[must_use]
     pub fn contacts(&self) -> Contacts<'_> {
-        if self.is_in_order() {
+        if self.set.is_ordered() {
             self.numbered()
         } else {
-            self.present().contacts()
+            self.ordered().contacts()
         }
     }
 
@@ -25,59 +25,32 @@ impl ContactLaw {
     pub(crate) fn copy_contacts(&self, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
         pairs.clear();
         forces.clear();
-        pairs.reserve(self.contact_count());
-        forces.reserve(self.contact_count());
-        for stretch in self.in_order() {
-            pairs.extend_from_slice(&self.pairs[stretch.clone()]);
-            forces.extend_from_slice(&self.forces[stretch]);
+        pairs.reserve(self.set.active());
+        forces.reserve(self.set.active());
+        for stretch in self.set.in_order() {
+            pairs.extend_from_slice(&self.set.pairs()[stretch.clone()]);
+            forces.extend_from_slice(&self.set.forces()[stretch]);
         }
     }
 
-    /// The contacts that are not at rest in the order of pairs, as stretches of their numbers.
-    fn in_order(&self) -> Vec<Range<usize>> {
-        let sorted = self.pairs.len() - self.added.len();
-        let (mut gone, mut late) = (self.at_rest.clone(), Vec::new());
-        gone.sort_unstable();
-        // Before which of the sorted ones a later one belongs.
-        for c in sorted..self.pairs.len() {
-            if gone.binary_search(&(c as u32)).is_err() {
-                let before = self.pairs[..sorted].partition_point(|pair| *pair < self.pairs[c]);
-                late.push((before, self.pairs[c], c));
-            }
-        }
-        late.sort_unstable();
-        let (mut stretches, mut from) = (Vec::new(), 0);
-        let mut late = late.into_iter().peekable();
-        let ends = gone.into_iter().map(|c| c as usize);
-        for end in ends.take_while(|c| *c < sorted).chain([sorted]) {
-            while let Some((before, _, c)) = late.next_if(|(before, ..)| *before <= end) {
-                stretches.extend([from..before, c..c + 1]);
-                from = before;
-            }
-            stretches.push(from..end);
-            from = end + 1;
-        }
-        stretches
-    }
-
-    /// The contacts in the order of their numbers, those at rest among them with no force.
+    /// The contacts in the order of their numbers, the inactive ones among them with no force.
     pub(crate) fn numbered(&self) -> Contacts<'_> {
         Contacts {
-            pairs: &self.pairs,
+            pairs: self.set.pairs(),
             normals: self.geometry.normals(),
             distances: self.geometry.distances(),
             overlaps: self.geometry.overlaps(),
-            forces: &self.forces,
+            forces: self.set.forces(),
         }
     }
 
     /// The matrix `A` of the contacts found last.
     #[must_use]
     pub fn matrix(&self) -> &ContactMatrix {
-        if self.is_in_order() && self.matrix.is_complete() {
+        if self.set.is_ordered() && self.matrix.is_complete() {
             &self.matrix
         } else {
-            self.present().matrix(&self.matrix, &self.geometry)
+            self.ordered().matrix(&self.matrix, &self.geometry)
         }
     }
 
@@ -87,7 +60,7 @@ impl ContactLaw {
         let numbered = self.numbered();
         net_forces(&numbered, net);
         // A contact that came late is at the end of the numbers, and not in its place.
-        for &p in self.added.as_flattened() {
+        for &p in self.set.added().as_flattened() {
             let duplicate = self.geometry.duplicate();
             let partners = duplicate.partners(p as usize).iter();
             let mut sum = Vec2::zeros();
@@ -118,23 +91,18 @@ impl ContactLaw {
 
     /// Number of contacts.
     pub(crate) fn contact_count(&self) -> usize {
-        self.pairs.len() - self.at_rest.len()
+        self.set.active()
     }
 
-    /// Whether the numbers of the contacts are their places in the order of pairs, and all are in contact.
-    pub(super) fn is_in_order(&self) -> bool {
-        self.at_rest.is_empty() && self.added.is_empty()
-    }
-
-    pub(super) fn present(&self) -> &Present {
-        self.present
-            .get_or_init(|| Present::of(&self.numbered(), &self.in_order(), &self.matrix))
+    pub(super) fn ordered(&self) -> &Ordered {
+        self.ordered
+            .get_or_init(|| Ordered::of(&self.numbered(), &self.set.in_order(), &self.matrix))
     }
 }
 
-/// The contacts that are not at rest, in the order of pairs.
+/// The contacts that are active, in the order of pairs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Present {
+pub(super) struct Ordered {
     /// Their numbers.
     order: Vec<u32>,
     contacts: FrameContacts,
@@ -142,7 +110,7 @@ pub(super) struct Present {
     matrix: OnceLock<ContactMatrix>,
 }
 
-impl Present {
+impl Ordered {
     /// Those `stretches` of `numbered`, the contacts of `matrix`.
     fn of(numbered: &Contacts<'_>, stretches: &[Range<usize>], matrix: &ContactMatrix) -> Self {
         let order = stretches.iter().cloned().flatten();

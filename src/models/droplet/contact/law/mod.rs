@@ -1,19 +1,30 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
+//!
+//! - The [set](super::set) alone says which pairs are in contact; geometry and matrix have its numbers once it is `structured`.
+//! - Geometry and matrix are of the positions solved last once the set is `assembled`.
+//! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
-use super::bulges::Bulges;
-use super::complementarity::Offence;
-use super::error::ContactError;
-use super::list::ContactList;
-use super::matrix::{ContactMatrix, Geometry, Precision};
-use super::patch::Patch;
-use super::present::{Present, name_of};
-use super::product::FirstProducts;
-use super::search::Search;
-use super::solver::{LinearSolver, Method};
-use super::tolerance::{ACCEPTED, relative_tolerance, slack};
-use crate::neighbors::NeighborList;
+pub mod complementarity;
+#[cfg(test)]
+mod history;
+mod local_region;
+mod local_update;
+mod ordered;
+
+use crate::models::droplet::contact::bulges::Bulges;
+use crate::models::droplet::contact::candidates::Candidates;
+use crate::models::droplet::contact::error::ContactError;
+use crate::models::droplet::contact::matrix::product::FirstProducts;
+use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry, Precision};
+use crate::models::droplet::contact::search::Search;
+use crate::models::droplet::contact::set::ContactSet;
+use crate::models::droplet::contact::solver::{LinearSolver, Method};
+use crate::models::droplet::contact::tolerance::{ACCEPTED, relative_tolerance, slack};
 use crate::state::Packing;
+pub(super) use complementarity::Violation;
 use core::f64::consts::PI;
+use local_region::LocalRegion;
+use ordered::{Ordered, name_of};
 use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
@@ -60,60 +71,46 @@ pub enum Rule {
 /// ```
 #[derive(Clone, Debug)]
 pub struct ContactLaw {
-    pub(super) rule: Rule,
-    pub(super) line_tension: f64,
-    pub(super) tolerance: f64,
-    pub(super) solver: LinearSolver,
-    pub(super) neighbors: NeighborList,
-    pub(super) list: ContactList,
-    pub(super) geometry: Geometry,
-    pub(super) matrix: ContactMatrix,
-    /// The contacts by number: ascending when the structure is built, then those that came since, in the order in which they
-    /// came. Which numbers they have reaches no bit of a result.
-    pub(super) pairs: Vec<[u32; 2]>,
-    /// Their forces; 0 for contacts at rest.
-    pub(super) forces: Vec<f64>,
-    /// The numbers of the contacts that have left since the structure was built: they are at rest.
-    pub(super) at_rest: Vec<u32>,
-    /// Contacts that came since the structure was built, in any order.
-    pub(super) added: Vec<[u32; 2]>,
-    /// What came (`true`) and went in the last solution, one after the other, and what the set of contacts was called before
-    /// and is called now.
-    pub(super) changes: Vec<([u32; 2], bool)>,
-    pub(super) sets: (u64, u64),
-    /// Whether list, geometry and matrix have the structure of `pairs`, and whether their values are those of the positions.
-    pub(super) structured: bool,
-    pub(super) refreshed: bool,
-    /// The contacts in their order, if somebody asked for them.
-    pub(super) present: OnceLock<Present>,
-    /// The neighbour list without `pairs`, and whether it is up to date.
-    pub(super) others: Vec<[u32; 2]>,
-    pub(super) parted: bool,
+    rule: Rule,
+    line_tension: f64,
+    tolerance: f64,
+    solver: LinearSolver,
+    geometry: Geometry,
+    matrix: ContactMatrix,
+    set: ContactSet,
+    /// What came (`true`) and went in the last solution, one after the other.
+    changes: Vec<([u32; 2], bool)>,
+    /// The names of the set of contacts before the last solution and now.
+    sets: (u64, u64),
+    /// Whether geometry and matrix have the contacts of the set by its numbers.
+    structured: bool,
+    /// Whether geometry and matrix are of the positions at hand.
+    assembled: bool,
+    /// The active contacts in the order of pairs, once they are asked for.
+    ordered: OnceLock<Ordered>,
+    candidates: Candidates,
     /// What the first residual of this solution is computed in.
-    pub(super) precision: Precision,
-    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](super::due_tolerance).
-    pub(super) slack: f64,
-    pub(super) image: Vec<f64>,
-    pub(super) products: FirstProducts,
-    pub(super) bulges: Bulges,
-    /// The largest bulge that the neighbour list is known to cover at the present positions.
-    pub(super) covered: f64,
+    precision: Precision,
+    /// The residual that is looked for beyond the tolerance (length); see [`due_tolerance`](crate::models::droplet::contact::due_tolerance).
+    slack: f64,
+    /// `A f`, where the solver does not know the residual (length).
+    image: Vec<f64>,
+    products: FirstProducts,
+    bulges: Bulges,
     /// The largest overlap of contours outside the set that the tolerance lets pass (length).
-    pub(super) tolerated: f64,
+    tolerated: f64,
     /// Searches for pairs that touch, in each of two threads.
-    pub(super) searches: [Search; 2],
-    pub(super) patch: Patch,
-    /// Particles whose bulge is beyond all reason, the first of them.
-    pub(super) diverged: Option<(usize, f64)>,
-    pub(super) offending: Vec<Offence>,
-    /// How far the particles may have moved since the neighbour list was looked at (length).
-    pub(super) moved: f64,
+    searches: [Search; 2],
+    region: LocalRegion,
+    /// The first particle whose bulge was cut short, and the bound of its bulge (length); its forces diverged.
+    diverged: Option<(usize, f64)>,
+    violations: Vec<Violation>,
     /// The largest `|δ|` of the contacts (length).
-    pub(super) scale: f64,
+    scale: f64,
     /// The largest `|A f − δ|` (length).
-    pub(super) off: f64,
-    pub(super) residual: f64,
-    pub(super) work: Work,
+    equation: f64,
+    residual: f64,
+    work: Work,
 }
 
 /// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
@@ -130,17 +127,15 @@ pub struct Work {
     /// Iterations of the linear solver.
     pub iterations: u64,
     /// Exchanges of few contacts after which only the forces around them were solved for.
-    pub patches: u64,
-    /// Iterations of the linear solver on such patches.
-    pub patch_iterations: u64,
+    pub local_updates: u64,
+    /// Iterations of the linear solver on such regions.
+    pub local_iterations: u64,
     /// Geometries computed of all contacts; after an exchange only that of new ones is.
     pub assemblies: u64,
     /// Those of which entries were computed in single precision, which is enough far from balance.
     pub singles: u64,
     /// Structures of the contact set (lists, places in `A`) built.
     pub structures: u64,
-    /// Matrices whose entries were kept in double precision; far above round-off their products with the forces are enough.
-    pub values: u64,
     /// Symbolic factorisations; none unless the solver is the sparse Cholesky.
     pub symbolic: u64,
     /// Distances computed of pairs outside the set.
@@ -166,35 +161,27 @@ impl ContactLaw {
             line_tension,
             tolerance,
             solver: LinearSolver::new(method),
-            neighbors: NeighborList::new(),
-            list: ContactList::default(),
             geometry: Geometry::default(),
             matrix: ContactMatrix::default(),
-            pairs: Vec::new(),
-            forces: Vec::new(),
-            at_rest: Vec::new(),
-            added: Vec::new(),
+            set: ContactSet::default(),
             changes: Vec::new(),
             sets: (0, 0),
             structured: false,
-            refreshed: false,
-            present: OnceLock::new(),
-            others: Vec::new(),
-            parted: false,
+            assembled: false,
+            ordered: OnceLock::new(),
+            candidates: Candidates::default(),
             precision: Precision::Double,
             slack: 0.0,
             image: Vec::new(),
             products: FirstProducts::default(),
             bulges: Bulges::default(),
-            covered: 0.0,
             tolerated: 0.0,
             searches: Default::default(),
-            patch: Patch::default(),
+            region: LocalRegion::default(),
             diverged: None,
-            offending: Vec::new(),
-            moved: f64::INFINITY,
+            violations: Vec::new(),
             scale: 0.0,
-            off: 0.0,
+            equation: 0.0,
             residual: 0.0,
             work: Work::default(),
         }
@@ -212,7 +199,7 @@ impl ContactLaw {
     }
 
     /// `1/2πγ`.
-    pub(super) fn per_radius(&self) -> f64 {
+    fn per_radius(&self) -> f64 {
         1.0 / (2.0 * PI * self.line_tension)
     }
 
@@ -238,28 +225,27 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
-        (self.refreshed, self.moved) = (false, f64::INFINITY);
+        self.assembled = false;
+        self.candidates.move_by(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
     }
 
     fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.present.take();
-        if !self.is_in_order() || self.pairs != pairs || !self.neighbors.is_of(packing) {
-            self.pairs.clear();
-            self.pairs.extend_from_slice(pairs);
-            self.at_rest.clear();
-            self.added.clear();
+        self.ordered.take();
+        let known = self.set.is_ordered() && self.set.pairs() == pairs;
+        if !known || !self.candidates.is_of(packing) {
+            self.set.replace(pairs);
+            self.candidates.forget();
             self.bulges.forget();
-            (self.structured, self.parted) = (false, false);
+            self.structured = false;
             let set = name_of(pairs);
             self.sets = (set, set);
         }
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.forces.clear();
-        self.forces.extend_from_slice(forces);
+        self.set.replace_forces(forces);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
@@ -282,9 +268,8 @@ impl ContactLaw {
     #[must_use]
     pub fn work(&self) -> Work {
         Work {
-            neighbor_lists: self.neighbors.builds(),
+            neighbor_lists: self.candidates.builds(),
             symbolic: self.solver.symbolic_factorizations(),
-            values: self.matrix.kept,
             ..self.work
         }
     }
@@ -330,7 +315,7 @@ impl ContactLaw {
     /// assert_eq!(law.work().iterations, iterations, "the answer is its own best guess");
     /// ```
     pub fn solve_again(&mut self, packing: &Packing) -> Result<(), ContactError> {
-        if !self.neighbors.is_of(packing) {
+        if !self.candidates.is_of(packing) {
             // Other particles: contacts of the ones before mean nothing.
             self.take(packing, &[], &[]);
         }
@@ -345,11 +330,11 @@ impl ContactLaw {
         f_max: f64,
         moved: f64,
     ) -> Result<(), ContactError> {
-        self.present.take();
+        self.ordered.take();
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.refreshed = false;
-        self.moved += moved;
+        self.assembled = false;
+        self.candidates.move_by(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {
@@ -357,7 +342,7 @@ impl ContactLaw {
             Rule::Saitoh => {
                 (self.slack, self.precision) = (0.0, Precision::Double);
                 self.sweep(packing)?;
-                self.exchange(packing, self.offending.len());
+                self.exchange(packing, self.violations.len());
                 self.sweep(packing)?;
             }
         }
@@ -370,7 +355,7 @@ impl ContactLaw {
             // It solves twice and takes what comes.
             return Ok(());
         }
-        self.present.take();
+        self.ordered.take();
         self.slack = slack(packing, f_max);
         self.settle(packing)?;
         self.check_answer(packing)
@@ -386,7 +371,7 @@ impl ContactLaw {
     }
 
     /// The tolerance that is due in a frame whose largest net force is `f_max` (units of γ), with the contacts found last;
-    /// see [`due_tolerance`](super::due_tolerance).
+    /// see [`due_tolerance`](crate::models::droplet::contact::due_tolerance).
     #[must_use]
     pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
         match self.rule {
@@ -399,13 +384,13 @@ impl ContactLaw {
 
     /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
     /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
-    pub(super) fn passed_over(&self, scale: f64) -> f64 {
+    fn passed_over(&self, scale: f64) -> f64 {
         let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
         part * ACCEPTED * self.allowed(scale)
     }
 
     /// The residual looked for, as a length; `scale` is the largest `|δ|`.
-    pub(super) fn allowed(&self, scale: f64) -> f64 {
+    fn allowed(&self, scale: f64) -> f64 {
         scale * relative_tolerance(self.tolerance, self.slack, scale)
     }
 }
@@ -417,15 +402,15 @@ mod tests {
 
     /// Where each buffer is, and how long it may get without moving.
     fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
-        fn of<T>(v: &Vec<T>) -> (usize, usize) {
-            (v.as_ptr() as usize, v.capacity())
+        fn of<T>(v: &[T]) -> (usize, usize) {
+            (v.as_ptr() as usize, v.len())
         }
         [
-            of(&law.pairs),
-            of(&law.forces),
-            of(&law.others),
-            of(&law.offending),
-            of(&law.at_rest),
+            of(law.set.pairs()),
+            of(law.set.forces()),
+            of(law.candidates.pairs()),
+            of(&law.violations),
+            of(law.set.inactive()),
         ]
     }
 

@@ -1,8 +1,8 @@
 //! Where the blocks of a [`ContactMatrix`] are, and how contacts come and go without a new structure.
 
-use super::list::{ContactList, DuplicateContactList};
-use super::matrix::{ContactMatrix, Geometry, Units};
-use super::sight::{Sight, rounding};
+use super::entries_f32::{Operand, rounding};
+use super::{ContactMatrix, Geometry, Units};
+use crate::models::droplet::contact::list::{ContactList, DuplicateContactList};
 use crate::models::droplet::kernel::G_AT_CONTACT;
 use crate::numerics::wide::wide;
 use crate::state::Packing;
@@ -118,7 +118,7 @@ impl ContactMatrix {
         }
         self.value.resize(value, 0.0);
         self.scaled.resize(value, 0.0);
-        self.sights.resize(self.pairs.len(), Sight::default());
+        self.operands.resize(self.pairs.len(), Operand::default());
         self.loads.resize(self.pairs.len(), 0.0);
     }
 
@@ -138,7 +138,7 @@ impl ContactMatrix {
         self.pairs.push(pair);
         self.diagonal.push(compliance);
         self.scaling.push(root_of_inverse(compliance));
-        self.sights.push(Sight::default());
+        self.operands.push(Operand::default());
         self.loads.push(0.0);
         for p in pair {
             self.remove_block(p);
@@ -186,19 +186,21 @@ impl ContactMatrix {
         self.end.copy_within(ends..ends + z, run.end + z * to);
     }
 
-    /// No contact is at rest any more and none was added: the contacts are those that the structure was built of.
+    /// All contacts are active and none was added: the contacts are those that the structure was built of.
     pub(crate) fn make_whole(&mut self) {
         self.changed = false;
     }
 
-    /// Lays contact `c` to rest: corrections leave its force, and it takes no part in them. Or wakes it again.
-    pub(crate) fn set_at_rest(&mut self, c: usize, at_rest: bool) {
+    /// Corrections leave the force of contact `c`, which takes no part in them.
+    pub(crate) fn deactivate(&mut self, c: usize) {
         (self.changed, self.lacks_values) = (true, true);
-        self.scaling[c] = if at_rest {
-            0.0
-        } else {
-            root_of_inverse(self.diagonal[c])
-        };
+        self.scaling[c] = 0.0;
+    }
+
+    /// Corrections reach contact `c` again.
+    pub(crate) fn activate(&mut self, c: usize) {
+        (self.changed, self.lacks_values) = (true, true);
+        self.scaling[c] = root_of_inverse(self.diagonal[c]);
     }
 
     /// The order of the blocks: within each stretch of particles by size, then by particle.
@@ -237,7 +239,7 @@ impl ContactMatrix {
         self.sorted = self.runs.len();
     }
 
-    /// The matrix of those contacts alone that are not at rest: `order` has their numbers, `contacts` them in this order, and
+    /// The matrix of those contacts alone that are active: `order` has their numbers, `contacts` them in this order, and
     /// `geometry` where they are.
     pub(crate) fn of_some(
         &self,
@@ -263,7 +265,7 @@ impl ContactMatrix {
 
 /// `A_cc = (3/4πγ) (R_i + R_j)` from `1/2πγ` and the sum of radii: one formula, and so one rounding, for whoever needs it.
 #[inline(always)]
-pub(super) fn compliance(per_radius: f64, sum: f64) -> f64 {
+pub(in crate::models::droplet::contact) fn compliance(per_radius: f64, sum: f64) -> f64 {
     -G_AT_CONTACT * per_radius * sum
 }
 

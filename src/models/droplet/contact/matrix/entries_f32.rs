@@ -14,11 +14,11 @@ use core::f64::consts::PI;
 pub(super) const LANES: usize = 8;
 
 /// What an entry is made of at one of its two contacts, by their bits: cosine and sine of the direction from the lower particle to the
-/// higher; its angle to the x axis in units of 2π/2³², which wraps; `A_cc^(−½)` in units of `(R_max/2πγ)^(−½)`, 0 for a contact at
-/// rest.
+/// higher; its angle to the x axis in units of 2π/2³², which wraps; `A_cc^(−½)` in units of `(R_max/2πγ)^(−½)`, 0 for an inactive
+/// contact.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(16))]
-pub(super) struct Sight([u32; 4]);
+pub(super) struct Operand([u32; 4]);
 
 /// The sign of a number, and half a turn.
 const TOP: u32 = 1 << 31;
@@ -26,7 +26,7 @@ const TOP: u32 = 1 << 31;
 /// What the opposite direction has turned over.
 const SEEN_FROM: [[u32; 4]; 2] = [[0; 4], [TOP, TOP, TOP, 0]];
 
-impl Sight {
+impl Operand {
     /// Of a contact whose direction, from the lower particle to the higher, has the components `(x, y)` and this `angle` (radians,
     /// −π to π), and whose scaling is `weight`.
     #[inline(always)]
@@ -48,7 +48,7 @@ impl Sight {
     }
 }
 
-/// Of one contact each in blocks that are computed together: its sight and what its entries are multiplied with.
+/// Of one contact each in blocks that are computed together: its operand and what its entries are multiplied with.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
 pub(super) struct Lanes {
@@ -61,7 +61,7 @@ pub(super) struct Lanes {
 
 impl Lanes {
     #[inline(always)]
-    fn set(&mut self, lane: usize, Sight([cos, sin, angle, weight]): Sight, load: f32) {
+    fn set(&mut self, lane: usize, Operand([cos, sin, angle, weight]): Operand, load: f32) {
         self.cos[lane] = f32::from_bits(cos);
         self.sin[lane] = f32::from_bits(sin);
         self.angle[lane] = angle;
@@ -90,54 +90,54 @@ fn entries(a: &Lanes, b: &Lanes, radius: &[f32; LANES]) -> [f32; LANES] {
 
 /// An estimate of the rounding of what the entries of a row make of the forces, as a part of the largest `A_cc f`: two units in the
 /// last place for each neighbour that the largest particle may have. At φ = 0.845 to 1.2 it comes to 1 to 4 units.
-pub(super) fn rounding(packing: &Packing) -> f64 {
+pub(in crate::models::droplet::contact) fn rounding(packing: &Packing) -> f64 {
     let neighbours = PI * (1.0 + packing.largest_radius() / packing.smallest_radius());
     2.0 * (1.0 + neighbours) * f64::from(f32::EPSILON)
 }
 
 /// What blocks are made from, and where they go.
-pub(super) struct SingleBlocks<'a> {
+pub(super) struct BlocksF32<'a> {
     pub(super) ends: &'a [u32],
     /// Of all contacts: how they are seen from their lower particles, and `A_cc^½ f_c`.
-    pub(super) sights: &'a [Sight],
+    pub(super) operands: &'a [Operand],
     pub(super) loads: &'a [f32],
     pub(super) scaled: &'a mut [f32],
     /// What the entries make of the loads is added to these.
     pub(super) products: &'a mut [f32],
     /// Room for the blocks.
-    pub(super) room: &'a mut Vec<Lanes>,
+    pub(super) scratch: &'a mut Vec<Lanes>,
 }
 
 /// Blocks of `Z` contacts with `T = Z (Z − 1)/2` entries each, and their products; `radii` are `−R_p/R_max`.
 #[inline(always)]
-pub(super) fn fill_single<const Z: usize, const T: usize>(
-    blocks: SingleBlocks<'_>,
+pub(super) fn fill_f32<const Z: usize, const T: usize>(
+    blocks: BlocksF32<'_>,
     mut radii: impl Iterator<Item = f32>,
 ) {
-    let SingleBlocks {
+    let BlocksF32 {
         ends,
-        sights,
+        operands,
         loads,
         scaled,
         products,
-        room,
+        scratch,
     } = blocks;
     let groups = ends.len().div_ceil(LANES * Z);
-    if room.len() < groups * Z {
-        room.resize(groups * Z, Lanes::default());
+    if scratch.len() < groups * Z {
+        scratch.resize(groups * Z, Lanes::default());
     }
-    let room = room.as_chunks_mut::<Z>().0;
+    let scratch = scratch.as_chunks_mut::<Z>().0;
     let (ends, scaled) = (ends.as_chunks::<Z>().0, scaled.as_chunks_mut::<T>().0);
-    let loads = &loads[..sights.len()];
-    for (ends, room) in ends.chunks(LANES).zip(&mut *room) {
+    let loads = &loads[..operands.len()];
+    for (ends, scratch) in ends.chunks(LANES).zip(&mut *scratch) {
         for (lane, ends) in ends.iter().enumerate() {
-            for (room, end) in room.iter_mut().zip(ends) {
+            for (scratch, end) in scratch.iter_mut().zip(ends) {
                 let c = (end >> 1) as usize;
-                room.set(lane % LANES, sights[c].from(*end), loads[c]);
+                scratch.set(lane % LANES, operands[c].from(*end), loads[c]);
             }
         }
     }
-    let groups = ends.chunks(LANES).zip(&*room);
+    let groups = ends.chunks(LANES).zip(&*scratch);
     for (scaled, (ends, lanes)) in scaled.chunks_mut(LANES).zip(groups) {
         let mut radius = [0.0; LANES];
         for (own, radius) in radius.iter_mut().zip(radii.by_ref().take(scaled.len())) {
@@ -165,33 +165,33 @@ pub(super) fn fill_single<const Z: usize, const T: usize>(
     }
 }
 
-/// [`fill_single`] of blocks of any size.
+/// [`fill_f32`] of blocks of any size.
 #[inline(always)]
-pub(super) fn fill_single_blocks(
+pub(super) fn fill_f32_blocks(
     size: usize,
-    blocks: SingleBlocks<'_>,
+    blocks: BlocksF32<'_>,
     radii: impl Iterator<Item = f32>,
 ) {
-    let SingleBlocks {
+    let BlocksF32 {
         ends,
-        sights,
+        operands,
         loads,
         scaled,
         products,
-        room,
+        scratch,
     } = blocks;
-    if room.len() < size {
-        room.resize(size, Lanes::default());
+    if scratch.len() < size {
+        scratch.resize(size, Lanes::default());
     }
     let scaled = scaled.chunks_exact_mut(size * (size - 1) / 2);
     for ((ends, radius), scaled) in ends.chunks_exact(size).zip(radii).zip(scaled) {
-        for (room, end) in room.iter_mut().zip(ends) {
-            room.set(0, sights[(end >> 1) as usize].from(*end), 0.0);
+        for (scratch, end) in scratch.iter_mut().zip(ends) {
+            scratch.set(0, operands[(end >> 1) as usize].from(*end), 0.0);
         }
         let mut column = scaled.iter_mut();
         for b in 1..size {
             for (a, scaled) in (0..b).zip(&mut column) {
-                *scaled = entries(&room[a], &room[b], &[radius; LANES])[0];
+                *scaled = entries(&scratch[a], &scratch[b], &[radius; LANES])[0];
             }
         }
         product_of_blocks(size, ends, scaled, loads, products);
@@ -203,8 +203,8 @@ mod tests {
     use super::rounding;
     use crate::domain::{Domain, Vec2};
     use crate::models::droplet::contact::list::ContactList;
+    use crate::models::droplet::contact::matrix::product::FirstProducts;
     use crate::models::droplet::contact::matrix::{ContactMatrix, Geometry};
-    use crate::models::droplet::contact::product::FirstProducts;
     use crate::protocol::Relaxation;
     use crate::scene::Scene;
     use crate::state::Packing;
@@ -220,7 +220,7 @@ mod tests {
         matrix.multiply(forces, &mut image);
         let rounded = matrix.scaled().to_vec();
         let mut products = FirstProducts::default();
-        matrix.fill_in_single(&geometry, forces, &mut products);
+        matrix.assemble_f32(&geometry, forces, &mut products);
         let entries = rounded.iter().zip(matrix.scaled());
         let entries = entries.map(|(a, b)| f64::from((a - b).abs()));
         let (mut off, mut load) = (0.0f64, 0.0f64);
