@@ -89,7 +89,7 @@ fn contacts_come_and_go_without_a_new_structure() {
 }
 
 #[test]
-fn few_exchanges_are_solved_for_on_a_patch_and_keep_the_promise() {
+fn few_exchanges_are_solved_for_in_a_local_update_and_keep_the_promise() {
     let (mut updates, mut sweeps, mut steps) = (0, 0, 0);
     let scene = Scene {
         threshold: 1e-6,
@@ -110,7 +110,7 @@ fn few_exchanges_are_solved_for_on_a_patch_and_keep_the_promise() {
     println!("{updates} updates, {sweeps} sweeps in {steps} steps");
     assert!(10 * updates > steps, "exchanges are local updates");
     assert!(10 * sweeps < 11 * steps, "and hardly ever solved for anew");
-    // Measured: 2 to 3 iterations a patch.
+    // Measured: 2 to 3 iterations a local update.
     let iterations = run.law().unwrap().work().local_iterations;
     assert!(iterations < 6 * updates, "{iterations} in {updates}");
 }
