@@ -16,13 +16,13 @@
 )]
 
 use softjam::analysis::Backbone;
-use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
 use softjam::models::droplet::contour::{ContourStyle, Contours};
 use softjam::neighbors::NeighborList;
 use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
+use softjam::scene::DiskParameters;
 use softjam::scene::{Scene, start};
 use softjam::state::Packing;
 use std::error::Error;

@@ -143,6 +143,7 @@ pub fn convert(
         channels: *channels,
         first: recording.from_step(),
         has_states: recording.scene().channels.state.is_on(),
+        stage: 0,
         waiting: BTreeMap::new(),
         last: None,
         rebuilt: 0,
@@ -198,6 +199,8 @@ struct Conversion {
     first: u64,
     /// Whether there are states to wait for.
     has_states: bool,
+    /// The stage of the last recorded frame.
+    stage: u32,
     /// Metrics of steps that are not written yet.
     waiting: BTreeMap<u64, Row>,
     /// The last recorded frame; not written yet, since the last of all is written by every channel.
@@ -245,7 +248,8 @@ impl Conversion {
         if let Some(from) = self.last.take() {
             self.write_frame(recording, &from, false)?;
             let behind = from.step + 1;
-            if self.lacks_something(behind, frame.step) {
+            let channels = self.scheduled(recording, &from);
+            if self.lacks_something(&channels, behind, frame.step) {
                 self.walk(recording, from, &frame)?;
             } else {
                 let rows: Vec<_> = self.waiting.range(behind..frame.step).collect();
@@ -260,15 +264,25 @@ impl Conversion {
         Ok(())
     }
 
+    /// The channels in the stage of `frame`.
+    fn scheduled(&self, recording: &Recording, frame: &Frame) -> Channels {
+        let scene = recording.scene();
+        if frame.stage == 0 && scene.records_disks() {
+            self.channels.of_disks(scene.disks.record)
+        } else {
+            self.channels
+        }
+    }
+
     /// Whether the channels ask for something at the steps from `behind` to before `until` that was not recorded.
-    fn lacks_something(&self, behind: u64, until: u64) -> bool {
+    fn lacks_something(&self, channels: &Channels, behind: u64, until: u64) -> bool {
         let Channels {
             contours,
             contacts,
             metrics,
             state,
             ..
-        } = self.channels;
+        } = *channels;
         let asks = |schedule: Schedule| {
             let first = behind.checked_sub(1).and_then(|step| schedule.after(step));
             first.filter(|step| *step < until)
@@ -330,8 +344,10 @@ impl Conversion {
         last: bool,
     ) -> Result<(), ConvertError> {
         let step = frame.step;
-        let edge = last || step == self.first;
-        let [contours, contacts, metrics, state] = self.channels.at(step, edge);
+        let begins_stage = core::mem::replace(&mut self.stage, frame.stage) != frame.stage;
+        let edge = last || step == self.first || begins_stage;
+        let channels = self.scheduled(recording, frame);
+        let [contours, contacts, metrics, state] = channels.at(step, edge);
         let row = self.waiting.get(&step).and_then(Row::whole);
         let metrics = match (metrics, row) {
             (false, _) => None,

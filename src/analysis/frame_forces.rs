@@ -45,8 +45,8 @@ pub struct FrameForces {
 }
 
 impl FrameForces {
-    /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `model` is the
-    /// [scene's](crate::scene::Scene::model).
+    /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `model` is that of the
+    /// scene's [stage](crate::scene::Scene::stage).
     ///
     /// # Panics
     ///

@@ -230,7 +230,8 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
                 width: arguments.width.unwrap_or(Style::default().width),
                 range: arguments.range,
             };
-            if style.color == ColorBy::Deformation && scene.model == Kind::Disks {
+            let model = scene.stage(frame.stage).model;
+            if style.color == ColorBy::Deformation && model == Kind::Disks {
                 format!(
                     "{shown} is of disks, which keep their shape: --color deformation has nothing to show"
                 )

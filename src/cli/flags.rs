@@ -48,6 +48,11 @@ pub struct SceneFlags {
     #[arg(long, help_heading = PACKING)]
     relax_disks: bool,
 
+    /// Record the disks of the start, too, as the first stage of the recording: contours, contacts and state by this schedule
+    /// (every:K or log:K), metrics by their own. Steps count from the start of the disks then.
+    #[arg(long, value_name = "SCHEDULE", help_heading = RECORDING)]
+    record_disks: Option<Schedule>,
+
     /// Line tension γ, the unit of force, 1e-100 … 1e100; disks have the stiffness k = 4πγ / 3(R_i + R_j) [default: 1].
     #[arg(long, value_name = "GAMMA", value_parser = real, allow_negative_numbers = true, help_heading = PACKING)]
     line_tension: Option<f64>,
@@ -172,8 +177,9 @@ impl SceneFlags {
             // A scene is text. What of a name is none is replaced in it; see `file_unlike_text`.
             file: (self.file.as_ref()).map(|path| path.to_string_lossy().into_owned()),
             separate: self.separate.then_some(true),
-            disks: self.relax_disks.then(|| DiskFields {
-                relax: Some(true),
+            disks: Some(DiskFields {
+                relax: self.relax_disks.then_some(true),
+                record: self.record_disks,
                 ..DiskFields::default()
             }),
             line_tension: self.line_tension,

@@ -120,13 +120,15 @@ impl Findings {
     /// Stress of the last state.
     fn observables(&self, recording: &Recording) -> Option<Observables> {
         let (packing, last) = self.state(recording)?;
-        Some(*FrameForces::of(&packing, last, recording.scene().model()).observables())
+        let model = recording.scene().stage(last.stage).model();
+        Some(*FrameForces::of(&packing, last, model).observables())
     }
 
     /// How far the last state strains a linear model.
     fn squeeze(&self, recording: &Recording) -> Option<Validity> {
         let (packing, last) = self.state(recording)?;
-        let (scene, contacts) = (recording.scene(), FrameContacts::of(&packing, last));
+        let scene = recording.scene().stage(last.stage);
+        let contacts = FrameContacts::of(&packing, last);
         (scene.model).validity(&contacts.view(), packing.len(), scene.line_tension)
     }
 }

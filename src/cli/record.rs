@@ -49,8 +49,8 @@ pub struct Arguments {
         value_name = "RUN.rrd",
         help_heading = "Continue",
         conflicts_with_all = [
-            "scene", "particles", "phi", "aspect", "seed", "start", "file", "separate", "relax_disks", "line_tension",
-            "dt_max", "contact_rule", "contact_solver",
+            "scene", "particles", "phi", "aspect", "seed", "start", "file", "separate", "relax_disks", "record_disks",
+            "line_tension", "dt_max", "contact_rule", "contact_solver",
         ]
     )]
     from: Option<PathBuf>,
@@ -137,7 +137,8 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     super::report(&report::of(&outputs, &scene, &run, &summary, before, steps))?;
     live.finish(summary.outcome)?;
     let particles = run.packing().len();
-    let validity = (scene.model).validity(&run.contacts(), particles, scene.line_tension);
+    let model = scene.stage(run.stage()).model;
+    let validity = model.validity(&run.contacts(), particles, scene.line_tension);
     if let Some(warning) = validity.and_then(|v| v.warning()) {
         warn(&warning);
     }

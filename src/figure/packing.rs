@@ -102,6 +102,7 @@ const OUTLINE: (f64, f64) = (0.03, 1.2);
 /// See the example of the [module](super).
 #[must_use]
 pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -> String {
+    let scene = &*scene.stage(frame.stage);
     let line_tension = scene.line_tension;
     let contacts = FrameContacts::of(packing, frame);
     let contacts = contacts.view();

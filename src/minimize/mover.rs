@@ -28,9 +28,14 @@ pub(crate) struct Mover {
 }
 
 impl Mover {
-    /// A minimiser with the given bound of the time step, before its first move; `finishes` says whether Newton's method does.
-    pub fn start(fire: Fire, finishes: bool, dt_max: f64) -> Self {
-        Self::at(fire, finishes, FireState::start(&fire, dt_max))
+    /// A minimiser with the given bound of the time step, before its first move at `time`; `finishes` says whether Newton's
+    /// method does.
+    pub fn start(fire: Fire, finishes: bool, dt_max: f64, time: f64) -> Self {
+        let state = FireState {
+            time,
+            ..FireState::start(&fire, dt_max)
+        };
+        Self::at(fire, finishes, state)
     }
 
     /// A minimiser that goes on from the numbers of a frame; `None` if they are another's.

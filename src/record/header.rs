@@ -151,9 +151,17 @@ fn text(header: &Header) -> String {
             "",
         ),
     };
+    let disks = if scene.records_disks() {
+        format!(
+            " Its first stage are the undeformed disks, to f_max ≤ {:e} γ.",
+            scene.disks.threshold
+        )
+    } else {
+        String::new()
+    };
     let mut parts = vec![format!(
         "**{} at φ = {:.4}**{coverage}, in a periodic box of \
-         {} × {}. {model}, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{first} Recorded by \
+         {} × {}. {model}, line tension γ = {}; from {start} to f_max ≤ {:e} γ.{disks}{first} Recorded by \
          {}.\n\n",
         counted(packing.len(), particle),
         packing.coverage(),

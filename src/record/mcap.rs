@@ -20,13 +20,12 @@ use super::messages::{
     descriptors, topic,
 };
 use super::patience::Patience;
-use super::pictures::Network;
+use super::pictures::{Network, StageContours};
 use super::redraw::Redraw;
 use super::scene_update::{contact_lines, contour_lines, vertex_cloud};
 use super::sink::Sink;
 use super::{Header, Outcome, Recorder, Snapshot, Written, legs_to_text};
 use crate::contacts::FrameContacts;
-use crate::models::droplet::contour::Contours;
 use crate::state::Frame;
 use crate::state::Packing;
 use foxglove::Encode;
@@ -74,7 +73,7 @@ pub struct McapRecorder<W: Write> {
     packing: Packing,
     line_tension: f64,
     format: u32,
-    contours: Contours,
+    contours: StageContours,
     redraw: Redraw,
     patience: Patience,
     message: Vec<u8>,
@@ -151,7 +150,7 @@ impl<W: Write> McapRecorder<W> {
             sink,
             line_tension: header.scene.line_tension,
             format: header.format,
-            contours: header.scene.model.contours(header.scene.contours),
+            contours: StageContours::of(&header.scene),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, CHUNK_MOVES),
             packing: header.packing,
@@ -176,11 +175,11 @@ impl<W: Write> McapRecorder<W> {
             let contacts = contacts.view();
             if let Some(particles) = particles {
                 let radii = self.packing.radii();
-                self.contours
-                    .draw(radii, &frame.positions, &contacts, self.line_tension);
+                let contours = self.contours.at(frame.stage);
+                contours.draw(radii, &frame.positions, &contacts, self.line_tension);
                 let colors = particles.colors();
-                let lines = contour_lines(step, &self.contours, &colors);
-                let cloud = vertex_cloud(step, &self.contours, &colors);
+                let lines = contour_lines(step, contours, &colors);
+                let cloud = vertex_cloud(step, contours, &colors);
                 self.send(self.topics.contours, step, &lines)?;
                 self.send(self.topics.vertices, step, &cloud)?;
             }

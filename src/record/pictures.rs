@@ -3,6 +3,8 @@
 use crate::analysis::Backbone;
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
+use crate::models::droplet::contour::Contours;
+use crate::scene::Scene;
 use crate::state::Frame;
 use core::f64::consts::PI;
 use std::sync::LazyLock;
@@ -13,6 +15,33 @@ pub(super) type Rgb = [u8; 3];
 /// A colour made darker by the factor `brightness`.
 pub(super) fn dimmed(rgb: Rgb, brightness: f64) -> Rgb {
     rgb.map(|part| (brightness * f64::from(part) + 0.5) as u8)
+}
+
+/// Contours of the model that each stage of a run has.
+pub(super) struct StageContours {
+    scene: Scene,
+    stage: u32,
+    contours: Contours,
+}
+
+impl StageContours {
+    /// Of a run of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            scene: scene.clone(),
+            stage: 0,
+            contours: scene.stage(0).model.contours(scene.contours),
+        }
+    }
+
+    /// Those of a stage.
+    pub fn at(&mut self, stage: u32) -> &mut Contours {
+        if stage != self.stage {
+            let scene = self.scene.stage(stage);
+            (self.stage, self.contours) = (stage, scene.model.contours(scene.contours));
+        }
+        &mut self.contours
+    }
 }
 
 /// What is seen of each particle beside its contour.

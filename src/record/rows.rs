@@ -4,13 +4,12 @@ use super::columns::StripRows;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
 use super::patience::Patience;
-use super::pictures::{Network, Particles};
+use super::pictures::{Network, Particles, StageContours};
 use super::redraw::Redraw;
 use super::states::StateRows;
 use super::{Header, Snapshot};
 use crate::analysis::Metrics;
 use crate::contacts::{Contacts, FrameContacts};
-use crate::models::droplet::contour::Contours;
 use crate::state::Frame;
 use crate::state::Packing;
 
@@ -29,7 +28,7 @@ pub(super) struct Rows {
     packing: Packing,
     line_tension: f64,
     format: u32,
-    contours: Contours,
+    contours: StageContours,
     redraw: Redraw,
     patience: Patience,
     /// Whether there was a batch.
@@ -66,7 +65,7 @@ impl Rows {
         Self {
             line_tension: header.scene.line_tension,
             format: header.format,
-            contours: header.scene.model.contours(header.scene.contours),
+            contours: StageContours::of(&header.scene),
             redraw: Redraw::new(&header),
             patience: Patience::of(&header, BATCH_MOVES),
             begun: false,
@@ -162,7 +161,13 @@ impl Rows {
             ..
         } = &mut self.pending;
         let line_tension = self.line_tension;
-        let drawing = (&mut self.contours, radii, frame, contacts, line_tension);
+        let drawing = (
+            self.contours.at(frame.stage),
+            radii,
+            frame,
+            contacts,
+            line_tension,
+        );
         let vertices = contours.contours(drawing, |p, polygon, extent| {
             let (color, centre) = (seen.color(p), frame.positions[p]);
             if !is_within(domain, centre, extent.reach) {

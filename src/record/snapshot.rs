@@ -37,13 +37,13 @@ pub struct Snapshot {
     pub contacts: bool,
     /// Whether the state is recorded.
     pub state: bool,
-    /// Whether it is the first or the last step of the recording, of which every picture is drawn.
+    /// Whether it is the first or the last step of the recording, or the first of a stage, of which every picture is drawn.
     pub edge: bool,
 }
 
 impl Snapshot {
     /// What `channels` ask for at the present step of `run`; `None` if that is nothing. At an `edge`, the first or the last
-    /// step of a recording, every channel that is on records.
+    /// step of a recording, and at the first of a stage every channel that is on records.
     #[must_use]
     pub fn of(run: &Relaxation, channels: &Channels, edge: bool) -> Option<Self> {
         Self::made(
@@ -63,6 +63,8 @@ impl Snapshot {
         backbone: &mut Backbone,
         room: impl FnOnce() -> Frame,
     ) -> Option<Self> {
+        let channels = run.scheduled(channels);
+        let edge = edge || run.begins_stage();
         let [contours, contacts, metrics, state] = channels.at(run.step(), edge);
         let pictured = contours || contacts || state;
         (pictured || metrics).then(|| Self {

@@ -65,9 +65,9 @@ impl Worst {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Balance {
-    model: AnyModel,
-    rule: Rule,
-    threshold: f64,
+    scene: Scene,
+    /// The stage of the frame before, and its model.
+    stage: (u32, AnyModel),
     /// `max |A f − δ|` of the recorded forces: Saitoh (4).
     pub equation_4: Worst,
     /// The same of the last frame alone.
@@ -97,9 +97,8 @@ impl Balance {
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         Self {
-            model: scene.model(),
-            rule: scene.contact_rule,
-            threshold: scene.threshold,
+            scene: scene.clone(),
+            stage: (0, scene.stage(0).model()),
             equation_4: Worst::default(),
             last_equation_4: 0.0,
             overlap: Worst::default(),
@@ -117,7 +116,11 @@ impl Balance {
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
     pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
-        let found = self.model.check(packing, frame, self.threshold);
+        let scene = self.scene.stage(frame.stage);
+        if frame.stage != self.stage.0 {
+            self.stage = (frame.stage, scene.model());
+        }
+        let found = (self.stage.1).check(packing, frame, scene.threshold);
         self.frames += 1;
         self.last = Some((step, found.f_max));
         self.last_equation_4 = found.residual;
@@ -146,8 +149,9 @@ impl Balance {
     #[must_use]
     pub fn agrees(&self) -> bool {
         let last = self.last.map_or(0, |(step, _)| step);
-        let within =
-            |worst: &Worst| worst.agrees() || (self.rule == Rule::Saitoh && worst.step != last);
+        let within = |worst: &Worst| {
+            worst.agrees() || (self.scene.contact_rule == Rule::Saitoh && worst.step != last)
+        };
         within(&self.equation_4)
             && within(&self.overlap)
             && within(&self.pull)
@@ -173,7 +177,7 @@ impl Balance {
             step == outcome.steps
                 && (f_max.to_bits() == outcome.f_max.to_bits()
                     || (f_max - outcome.f_max).abs() <= tolerance)
-                && outcome.converged == (outcome.f_max <= self.threshold)
+                && outcome.converged == (outcome.f_max <= self.scene.threshold)
         })
     }
 }

@@ -28,8 +28,8 @@ pub(super) struct Joined {
     before: Option<(String, Option<u64>)>,
     /// The last state of the part at hand, if no schedule asks for it.
     off_schedule: Option<Frame>,
-    /// The last state that was handed out.
-    last: Option<u64>,
+    /// The stage of the last state that was handed out.
+    stage: Option<u32>,
     digests: blake3::Hasher,
     outcome: Option<Outcome>,
     ending: Option<Ending>,
@@ -99,7 +99,7 @@ impl Recording {
             held: Held::default(),
             before: None,
             off_schedule: None,
-            last: None,
+            stage: None,
             digests: blake3::Hasher::new(),
             outcome: None,
             ending: None,
@@ -234,7 +234,9 @@ impl Joined {
         if self.is_shared(step) {
             self.held.states.insert(step, digest);
         }
-        if self.last.is_none() || self.scene.channels.state.includes(step) {
+        let schedule = self.scene.stage(frame.stage).channels.state;
+        let begins_stage = self.stage != Some(frame.stage);
+        if begins_stage || schedule.includes(step) {
             self.hand_out(frame, items);
         } else {
             self.off_schedule = Some(frame);
@@ -244,7 +246,7 @@ impl Joined {
 
     fn hand_out(&mut self, frame: Frame, items: &mut Vec<Item>) {
         let digest = frame.digest();
-        self.last = Some(frame.step);
+        self.stage = Some(frame.stage);
         self.digests.update(&digest);
         items.push(Item::State(frame, digest.to_vec()));
     }

@@ -179,12 +179,7 @@ impl Recording {
             path,
             format,
             source,
-            steps: Steps {
-                schedule: header.scene.channels.state,
-                first: header.from_step,
-                last: None,
-                off_schedule: false,
-            },
+            steps: Steps::new(&header.scene, header.from_step),
             header,
             events: VecDeque::new(),
             digests: blake3::Hasher::new(),
@@ -261,7 +256,7 @@ impl Recording {
         ReadError::Damaged {
             path: self.path.clone(),
             problem: problem.into(),
-            intact: self.steps.last,
+            intact: self.steps.last(),
         }
     }
 
@@ -287,7 +282,7 @@ impl Recording {
 
     fn check_state(&mut self, frame: Frame, digest: &[u8]) -> Result<Event, ReadError> {
         let step = frame.step;
-        let intact = self.steps.last;
+        let intact = self.steps.last();
         if frame.digest() != digest {
             return Err(ReadError::Digest {
                 path: self.path.clone(),
@@ -316,14 +311,13 @@ impl Recording {
                 intact,
             });
         }
-        if let Err(problem) = self.steps.accept(step) {
+        if let Err(problem) = self.steps.accept(step, frame.stage) {
             return Err(ReadError::Steps {
                 path: self.path.clone(),
                 problem: self.steps_behind(step).unwrap_or(problem),
                 intact,
             });
         }
-        self.steps.last = Some(step);
         self.digests.update(digest);
         Ok(Event::State(frame))
     }
@@ -342,7 +336,7 @@ impl Recording {
     }
 
     fn check_result(&mut self, outcome: Outcome, digest: [u8; 32]) -> Result<Event, ReadError> {
-        if self.steps.last.is_none() && self.header.scene.channels.state.is_on() {
+        if self.steps.last().is_none() && self.header.scene.channels.state.is_on() {
             return Err(ReadError::Steps {
                 path: self.path.clone(),
                 problem: "its scene records states, and it holds none: they were taken out of it"
@@ -353,14 +347,14 @@ impl Recording {
         let wrong = |problem: String| ReadError::Result {
             path: self.path.clone(),
             problem,
-            intact: self.steps.last,
+            intact: self.steps.last(),
         };
         if digest != *self.digests.finalize().as_bytes() {
             return Err(wrong(
                 "its digest is not that of the states before it".to_owned(),
             ));
         }
-        if self.steps.last.is_some_and(|last| last != outcome.steps) {
+        if self.steps.last().is_some_and(|last| last != outcome.steps) {
             return Err(wrong(format!(
                 "it names {}",
                 counted(outcome.steps, "step")
@@ -414,11 +408,11 @@ impl Iterator for Recording {
                 },
                 Problem::Several => ReadError::Several {
                     path: self.path.clone(),
-                    intact: self.steps.last,
+                    intact: self.steps.last(),
                 },
                 Problem::Parts => ReadError::Parts {
                     path: self.path.clone(),
-                    intact: self.steps.last,
+                    intact: self.steps.last(),
                 },
                 Problem::Other(error) => error,
             }));

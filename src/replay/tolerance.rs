@@ -39,6 +39,7 @@ impl Segment {
 fn promised(scene: &Scene, packing: &Packing, frame: &Frame) -> f64 {
     let mut packing = packing.clone();
     frame.positions.clone_into(packing.positions_mut());
+    let scene = scene.stage(frame.stage);
     scene.model().promise(&packing, frame, scene.threshold)
 }
 

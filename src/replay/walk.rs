@@ -81,7 +81,7 @@ impl Segment {
                 return Ok(None);
             }
         }
-        let edge = first || self.is_last(run, scene.channels.state);
+        let edge = first || self.is_last(run, run.scheduled(&scene.channels).state);
         if let Some(snapshot) = snapshots.take(run, &scene.channels, edge) {
             emit(snapshot);
         }

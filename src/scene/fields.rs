@@ -1,9 +1,11 @@
 //! A scene with gaps: what a file or the flags say, before defaults are filled in.
 
-use super::{Channels, Minimizer, Preparation, Radii, Scene, SceneError, Species, Start};
+use super::{
+    Channels, DiskParameters, Minimizer, Preparation, Radii, Scene, SceneError, Schedule, Species,
+    Start,
+};
 use crate::minimize::fire::Fire;
 use crate::models::Kind;
-use crate::models::disks::DiskParameters;
 use crate::models::droplet::Form;
 use crate::models::droplet::contact::Rule;
 use crate::models::droplet::contact::solver::Method;
@@ -87,6 +89,8 @@ pub struct DiskFields {
     pub threshold: Option<f64>,
     /// See [`DiskParameters::steps`].
     pub steps: Option<u64>,
+    /// See [`DiskParameters::record`].
+    pub record: Option<Schedule>,
 }
 
 impl DiskFields {
@@ -95,6 +99,7 @@ impl DiskFields {
             relax: flags.relax.or(self.relax),
             threshold: flags.threshold.or(self.threshold),
             steps: flags.steps.or(self.steps),
+            record: flags.record.or(self.record),
         }
     }
 
@@ -103,6 +108,7 @@ impl DiskFields {
         DiskParameters {
             threshold: self.threshold.unwrap_or(default.threshold),
             steps: self.steps.unwrap_or(default.steps),
+            record: self.record.unwrap_or(default.record),
         }
     }
 }
@@ -185,9 +191,10 @@ impl SceneFields {
             self.separate = None;
             disks.relax = None;
         }
-        disks = disks.overridden_by(flags.disks.unwrap_or_default());
+        let of_flags = flags.disks.unwrap_or_default();
+        disks = disks.overridden_by(of_flags);
         if flags.file.is_some() && disks.relax != Some(true) {
-            disks = DiskFields::default();
+            disks = of_flags;
         }
         self.disks = Some(disks);
         if flags.file.is_some() {

@@ -15,6 +15,7 @@
 //! assert_eq!(error.to_string(), "phi = 1.7 is outside 0 < phi < 1.3 (coverage of the undeformed disks)");
 //! ```
 
+mod disks;
 mod fields;
 mod print;
 pub mod schedule;
@@ -23,11 +24,12 @@ mod start_file;
 mod start_table;
 mod validate;
 
+pub use disks::DiskParameters;
 pub use fields::{DiskFields, SceneFields};
 pub use schedule::{Channels, Schedule};
 
 use crate::minimize::fire::Fire;
-use crate::models::disks::{DiskParameters, Disks};
+use crate::models::disks::Disks;
 use crate::models::droplet::contact::solver::Method;
 use crate::models::droplet::contact::{ContactLaw, Rule};
 use crate::models::droplet::contour::ContourStyle;
@@ -375,17 +377,6 @@ impl Scene {
             *hash = Some(start::StartFile::read(&*path)?.blake3());
         }
         Ok(self)
-    }
-
-    /// Whether the centres are relaxed as undeformed disks before the run; those of a start file are if it is asked for. A run of
-    /// disks is that relaxation.
-    #[must_use]
-    pub fn starts_from_disks(&self) -> bool {
-        let prepared = match self.start {
-            Start::Random | Start::Hexagonal => true,
-            Start::File { preparation, .. } => preparation == Preparation::Relaxed,
-        };
-        prepared && self.model != Kind::Disks
     }
 
     /// Whether particles, radii and box come from a file.

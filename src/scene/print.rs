@@ -18,15 +18,23 @@ impl Scene {
         page.text
     }
 
-    /// [`to_toml`](Self::to_toml) as recordings of a format have it: the first knew one model and did not name it.
+    /// [`to_toml`](Self::to_toml) as recordings of a format have it: the first knew one model, which it did not name, and one stage.
     #[must_use]
     pub fn to_toml_of(&self, format: u32) -> String {
-        let mut model = Page::default();
-        self.write_model(&mut model);
-        match format {
-            1 if self.model == Kind::default() => self.to_toml().replacen(&model.text, "", 1),
-            _ => self.to_toml(),
+        let mut text = self.to_toml();
+        if format == 1 && self.model == Kind::default() && !self.records_disks() {
+            for write in [Self::write_model, Self::write_record_of_disks] {
+                let mut page = Page::default();
+                write(self, &mut page);
+                text = text.replacen(&page.text, "", 1);
+            }
         }
+        text
+    }
+
+    fn write_record_of_disks(&self, page: &mut Page) {
+        page.text("# When contours, contacts and state of these disks are recorded: unless it is off, they are the first stage of the\n# recording, and steps count from their start.");
+        page.line("record", quoted(&self.disks.record.to_string()));
     }
 
     fn write_model(&self, page: &mut Page) {
@@ -199,6 +207,7 @@ impl Scene {
         }
         page.line("threshold", number(self.disks.threshold));
         page.line("steps", self.disks.steps);
+        self.write_record_of_disks(page);
     }
 
     fn write_recording(&self, page: &mut Page) {

@@ -169,6 +169,18 @@ impl Channels {
         ]
     }
 
+    /// These channels in the stage of recorded disks: contours, contacts and state that are on follow `record`.
+    #[must_use]
+    pub fn of_disks(&self, record: Schedule) -> Self {
+        let scheduled = |channel: Schedule| if channel.is_on() { record } else { channel };
+        Self {
+            contours: scheduled(self.contours),
+            contacts: scheduled(self.contacts),
+            state: scheduled(self.state),
+            ..*self
+        }
+    }
+
     /// Which of the channels, in the order of [`named`](Self::named), are recorded at `step`. At an `edge`, the first or
     /// the last frame of a recording, every channel is that is on.
     #[must_use]

@@ -66,6 +66,7 @@ impl Scene {
             self.forces == Form::Gradient,
             self.contact_rule == Rule::Saitoh,
         ];
+        let record = self.disks.record.to_string();
         let (field, value, why) = match self.model {
             Kind::Disks if newton => (
                 "minimizer",
@@ -86,6 +87,11 @@ impl Scene {
                 "disks.relax",
                 "true",
                 "the run itself relaxes them; leave it out",
+            ),
+            Kind::Disks if self.disks.record.is_on() => (
+                "disks.record",
+                record.as_str(),
+                "the run itself is of disks, which [channels] schedules; leave it out",
             ),
             _ => return Ok(()),
         };

@@ -135,6 +135,12 @@ pub enum FrameError {
         /// How many numbers there are.
         count: usize,
     },
+    /// It has something that no run of the scene has.
+    #[error("it has {what}, which no run of the scene has")]
+    Foreign {
+        /// What it is.
+        what: &'static str,
+    },
     /// A position lies outside the box, or a number is not finite.
     #[error("{what} {index} is {value}, which no run can give")]
     Value {

@@ -45,7 +45,7 @@ BESIDE = {
 
 class Recording:
     def __init__(self, path):
-        self.states, self.contours, self.metrics = {}, {}, {}
+        self.states, self.contours, self.metrics, self.stages = {}, {}, {}, {}
         self.beside = {entity: {} for entity in BESIDE}
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch = chunk.to_record_batch()
@@ -54,7 +54,8 @@ class Recording:
                 scene = tomllib.loads(batch["softjam.Scene:toml"][0][0].as_py())
                 self.line_tension = scene["line_tension"]
                 self.gradient = scene.get("forces", "central") == "gradient"
-                self.disks = scene.get("model", "morse-witten") == "disks"
+                self.model_is_disks = scene.get("model", "morse-witten") == "disks"
+                self.records_disks = scene.get("disks", {}).get("record", "off") != "off"
                 self.threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
                 self.seed_rule = scene.get("contact_rule") in ("saitoh", "seed")
                 self.channels = scene["channels"]
@@ -70,6 +71,8 @@ class Recording:
                         flat(batch["softjam.State:" + name][row])
                         for name in ("position", "contact", "force")
                     )
+                    if "softjam.State:stage" in batch.schema.names and (stage := batch["softjam.State:stage"][row]).is_valid:
+                        self.stages[batch["step"][row].as_py()] = sum(stage.as_py())
             elif entity == "/world/contours" and not chunk.is_static:
                 strips = [n for n in batch.schema.names if n.endswith(":strips")][0]
                 for row in range(batch.num_rows):
@@ -78,6 +81,10 @@ class Recording:
                 values = self.metrics.setdefault(entity.removeprefix("/metrics/"), {})
                 for row in range(batch.num_rows):
                     values[batch["step"][row].as_py()] = batch["Scalars:scalars"][row][0].as_py()
+
+    def disks(self, step):
+        """Whether the particles are undeformed disks: all along, or in the first stage of a run that records them."""
+        return self.model_is_disks or (self.records_disks and self.stages.get(step, 0) == 0)
 
 
 def flat(cell):
@@ -92,7 +99,7 @@ def nearest(d, box):
     return d - box * np.rint(d / box)
 
 
-def check_state(recording, state, gamma):
+def check_state(recording, state, gamma, disks):
     """Residuals of one frame: eq. (4), least gap, least force, f_max, pressure, energy."""
     positions, contacts, forces = state
     radii, box = recording.radii, recording.box
@@ -107,7 +114,7 @@ def check_state(recording, state, gamma):
     angle_j = np.arctan2(normal[:, 1], normal[:, 0])
     around = [[] for _ in range(n)]
     matrix = np.zeros((len(forces), len(forces)))
-    if recording.disks:
+    if disks:
         # f = k delta with k = 4 pi gamma / 3 (R_i + R_j), and nothing bulges.
         np.fill_diagonal(matrix, 3 * (radii[i] + radii[j]) / (4 * np.pi * gamma))
     else:
@@ -163,10 +170,10 @@ def check_state(recording, state, gamma):
     }
 
 
-def promised(recording, f_max, scale):
+def promised(recording, f_max, scale, disks):
     """The residual that a frame keeps to, relative to max |delta|: 16 tolerances; looser far from balance, f_max in units of gamma."""
     tolerance = recording.tolerance
-    if recording.disks:
+    if disks:
         return 1e-9
     if f_max > recording.threshold and not recording.seed_rule and scale > 0:
         tolerance = max(tolerance, min(3e-4, 1e-2 * f_max * 1.5 / np.pi * recording.radii.min() / scale))
@@ -329,8 +336,9 @@ def main():
     single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
     for step in steps:
         state = recording.states[step]
-        found = check_state(recording, state, gamma)
-        allowed = promised(recording, found["f_max"] / gamma, found["scale"])
+        disks = recording.disks(step)
+        found = check_state(recording, state, gamma, disks)
+        allowed = promised(recording, found["f_max"] / gamma, found["scale"], disks)
         worst["eq4"] = max(worst["eq4"], found["eq4"] / allowed)
         worst["gap"] = max(worst["gap"], -found["gap"] / allowed)
         worst["force"] = max(worst["force"], -found["force"])

@@ -2,11 +2,11 @@
 
 use softjam::domain::{Domain, Vec2};
 use softjam::minimize::fire::FireState;
-use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::models::droplet::contact::{ContactLaw, Rule};
 use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
+use softjam::scene::DiskParameters;
 use softjam::scene::{Radii, Scene, Species};
 use softjam::state::{Frame, Packing};
 use std::f64::consts::PI;

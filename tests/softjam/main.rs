@@ -43,4 +43,6 @@ mod redraw;
 mod replay;
 mod scenes;
 #[cfg(feature = "recording")]
+mod stages;
+#[cfg(feature = "recording")]
 mod viewer;

@@ -2,9 +2,9 @@
 
 mod start_file;
 
-use softjam::models::disks::DiskParameters;
 use softjam::protocol::Relaxation;
-use softjam::scene::{Preparation, Radii, Scene, Species, Start};
+use softjam::scene::DiskParameters;
+use softjam::scene::{Preparation, Radii, Scene, Schedule, Species, Start};
 
 /// Asserts that a scene text is refused and that the message holds all of `words`.
 #[track_caller]
@@ -318,6 +318,7 @@ fn every_scene_survives_the_way_through_its_text() {
             s.disks = DiskParameters {
                 threshold: 1e-300,
                 steps: u64::MAX,
+                record: Schedule::Log(7),
             }
         },
         |s| (s.radii, s.start) = (Radii::Spread { min: 0.1, max: 1e6 }, Start::Hexagonal),

@@ -58,7 +58,8 @@ pub(super) fn of(
         lines.line("contact law", residual);
     }
     // Without disks it is the time of the first contact problem.
-    let preparation = run.disks().map_or("start", |_| "disks");
+    let disks_first = run.disks().is_some() && !scene.records_disks();
+    let preparation = if disks_first { "disks" } else { "start" };
     let (rate, before) = (super::rate(steps, took), before.as_secs_f64());
     let took = took.as_secs_f64();
     let time = format!("{before:.2} s {preparation}, {took:.2} s relaxation ({rate:.0} steps/s)");

@@ -30,29 +30,6 @@ use core::f64::consts::PI;
 use forces::Candidates;
 use std::sync::OnceLock;
 
-/// When the relaxation of the disks that droplets start from ends.
-///
-/// ```
-/// assert_eq!(softjam::models::disks::DiskParameters::default().threshold, 1e-6);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DiskParameters {
-    /// The relaxation ends when `f_max` (units of γ) is not above this.
-    pub threshold: f64,
-    /// The relaxation ends after this many steps in any case.
-    pub steps: u64,
-}
-
-impl Default for DiskParameters {
-    fn default() -> Self {
-        Self {
-            threshold: 1e-6,
-            steps: 50_000,
-        }
-    }
-}
-
 /// `k (R_i + R_j) = 4πγ/3` (force).
 pub(crate) fn stiffness_sum(line_tension: f64) -> f64 {
     4.0 * PI * line_tension / 3.0

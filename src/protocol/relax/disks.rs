@@ -1,9 +1,7 @@
 //! The undeformed disks that droplets start from.
 
 use super::{RelaxError, Relaxation, Status};
-use crate::models::Kind;
-use crate::models::disks::DiskParameters;
-use crate::scene::Scene;
+use crate::scene::{DiskParameters, Scene};
 use crate::state::Packing;
 
 /// How the disks relaxed.
@@ -33,9 +31,9 @@ pub struct DiskReport {
 /// # Example
 ///
 /// ```
-/// use softjam::models::disks::DiskParameters;
 /// use softjam::domain::{Domain, Vec2};
 /// use softjam::protocol::relax_disks;
+/// use softjam::scene::DiskParameters;
 /// use softjam::state::Packing;
 ///
 /// let at = |x| Vec2::new(x, 2.0);
@@ -50,24 +48,30 @@ pub fn relax_disks(
     line_tension: f64,
 ) -> Result<DiskReport, RelaxError> {
     let scene = Scene {
-        model: Kind::Disks,
-        threshold: parameters.threshold,
-        steps: parameters.steps,
+        disks: *parameters,
         line_tension,
         ..Scene::default()
     };
-    let mut run = Relaxation::of_packing(&scene, packing.clone())?;
+    scene.validate()?;
+    let mut run = Relaxation::begin(&scene.of_disks(), packing.clone(), (0, 0.0))?;
     while run.status() == Status::Running {
         run.advance()?;
     }
-    let observables = run.observables();
-    let report = DiskReport {
-        steps: run.step,
-        f_max: observables.f_max,
-        converged: run.status() == Status::Converged,
-        coordination: observables.coordination(),
-        rattlers: observables.rattlers,
-    };
+    let report = run.disk_report();
     *packing = run.packing;
     Ok(report)
+}
+
+impl Relaxation {
+    /// How disks that have come to their end have relaxed.
+    pub(super) fn disk_report(&self) -> DiskReport {
+        let observables = self.observables();
+        DiskReport {
+            steps: self.step,
+            f_max: observables.f_max,
+            converged: self.is_balanced(),
+            coordination: observables.coordination(),
+            rattlers: observables.rattlers,
+        }
+    }
 }

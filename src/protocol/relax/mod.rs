@@ -40,6 +40,12 @@ pub struct Relaxation {
     step: u64,
     threshold: f64,
     step_limit: u64,
+    /// Counted from 0.
+    stage: u32,
+    /// The scene of the stage behind this one, which is of disks then.
+    next: Option<Box<Scene>>,
+    /// Whether this frame is the first of a stage behind another.
+    begins_stage: bool,
     disks: Option<DiskReport>,
     /// What this frame is, if it is in balance and somebody asked.
     judgement: OnceLock<Judgement>,
@@ -48,7 +54,7 @@ pub struct Relaxation {
 }
 
 impl Relaxation {
-    /// Frame 0 of a scene: its start, its disks relaxed, the contact problem solved.
+    /// Frame 0 of a scene: its start, its disks relaxed unless they are the first stage, the model solved.
     ///
     /// # Errors
     ///
@@ -58,15 +64,15 @@ impl Relaxation {
         Self::of_start(scene, start::packing(scene)?)
     }
 
-    /// Frame 0 of a scene whose start is at hand: disks relaxed if the scene says so, the contact problem solved.
+    /// [`new`](Self::new) of a scene whose start is at hand.
     ///
     /// # Errors
     ///
     /// As [`new`](Self::new).
     pub fn of_start(scene: &Scene, mut packing: Packing) -> Result<Self, RelaxError> {
         scene.validate()?;
-        let disks = scene
-            .starts_from_disks()
+        let relaxes_first = scene.starts_from_disks() && !scene.records_disks();
+        let disks = relaxes_first
             .then(|| relax_disks(&mut packing, &scene.disks, scene.line_tension))
             .transpose()?;
         let run = Self::of_packing(scene, packing)?;
@@ -89,16 +95,27 @@ impl Relaxation {
     /// ```
     pub fn of_packing(scene: &Scene, packing: Packing) -> Result<Self, RelaxError> {
         scene.validate()?;
+        let next = scene.records_disks().then(|| Box::new(scene.clone()));
+        let run = Self::begin(&scene.stage(0), packing, (0, 0.0))?;
+        Ok(Self { next, ..run })
+    }
+
+    /// The first frame of a run of `scene` as it stands, which is valid, after so many steps and at such a time.
+    fn begin(
+        scene: &Scene,
+        packing: Packing,
+        (step, time): (u64, f64),
+    ) -> Result<Self, RelaxError> {
         let mut model = scene.model();
-        let at_start = |source| RelaxError::Contact { step: 0, source };
+        let at_start = |source| RelaxError::Contact { step, source };
         model.solve(&packing, Goal::EXACT).map_err(at_start)?;
         let dt_max = match scene.dt_max {
             Some(dt_max) => dt_max,
             None => model.longest_time_step(&packing).map_err(at_start)?,
         };
-        let mover = Mover::start(scene.fire, finishes(scene), dt_max);
+        let mover = Mover::start(scene.fire, finishes(scene), dt_max, time);
         let velocities = vec![Vec2::zeros(); packing.len()];
-        Ok(Self::at(scene, packing, model, (0, velocities, mover)))
+        Ok(Self::at(scene, packing, model, (step, velocities, mover)))
     }
 
     /// A run of `scene` at a step with its velocities and minimiser; `model` has its contacts and forces.
@@ -116,6 +133,9 @@ impl Relaxation {
             step,
             threshold: scene.threshold,
             step_limit: scene.steps,
+            stage: 0,
+            next: None,
+            begins_stage: false,
             disks: None,
             judgement: OnceLock::new(),
             yielded: false,
@@ -133,7 +153,18 @@ impl Relaxation {
     pub fn resume(scene: &Scene, mut packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
+        let stages = if scene.records_disks() { 2 } else { 1 };
+        let foreign = [
+            ("a later stage", frame.stage >= stages),
+            ("a memory", !frame.memory.is_empty()),
+            ("a box of its own", frame.domain.is_some()),
+        ];
+        if let Some((what, _)) = foreign.into_iter().find(|(_, is)| *is) {
+            return Err(FrameError::Foreign { what }.into());
+        }
         *packing.positions_mut() = frame.positions;
+        let next = (frame.stage + 1 < stages).then(|| Box::new(scene.clone()));
+        let scene = &*scene.stage(frame.stage);
         let mut model = scene.model();
         model.restore(&packing, &frame.contacts, &frame.forces);
         let mover = Mover::resume(scene.fire, finishes(scene), &frame.minimizer).ok_or(
@@ -143,17 +174,26 @@ impl Relaxation {
             },
         )?;
         let moving = (frame.step, frame.velocities, mover);
-        Ok(Self::at(scene, packing, model, moving))
+        let run = Self::at(scene, packing, model, moving);
+        Ok(Self {
+            next,
+            stage: frame.stage,
+            ..run
+        })
     }
 
-    /// One move and the contact problem after it.
+    /// One move and the contact problem after it; at the end of a stage, the next one at the same positions.
     ///
     /// # Errors
     ///
     /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::TooFar`] if the run blew up. The
     /// run has then [failed](Status::Failed) and is of no further use.
     pub fn advance(&mut self) -> Result<(), RelaxError> {
+        if self.is_stage_over() {
+            return self.enter_next_stage();
+        }
         self.step += 1;
+        self.begins_stage = false;
         let is_on_saddle = self.is_on_saddle();
         let (packing, velocities) = (&mut self.packing, &mut self.velocities);
         if is_on_saddle {
@@ -166,6 +206,30 @@ impl Relaxation {
             self.check_distance(moved)?;
         }
         self.solve_or_fail(motion)
+    }
+
+    /// Whether this is the last frame of a stage that is followed by another.
+    fn is_stage_over(&self) -> bool {
+        self.next.is_some() && (self.is_balanced() || self.step >= self.step_limit)
+    }
+
+    /// The disks are relaxed, and become what the scene says.
+    fn enter_next_stage(&mut self) -> Result<(), RelaxError> {
+        let Some(scene) = self.next.take() else {
+            return Ok(());
+        };
+        let disks = Some(self.disk_report());
+        let at = (self.step + 1, self.mover.time());
+        let begun = Self::begin(&scene, self.packing.clone(), at);
+        self.failed = begun.is_err();
+        *self = Self {
+            stage: self.stage + 1,
+            begins_stage: true,
+            disks,
+            yielded: self.yielded,
+            ..begun?
+        };
+        Ok(())
     }
 
     /// Whether a run that goes on from saddles has come to one.
@@ -241,6 +305,8 @@ impl Relaxation {
     pub fn status(&self) -> Status {
         if self.failed {
             Status::Failed
+        } else if self.next.is_some() {
+            Status::Running
         } else if self.is_balanced() && !self.is_on_saddle() {
             Status::Converged
         } else if self.step >= self.step_limit {

@@ -7,6 +7,7 @@ use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contact::ContactLaw;
 use crate::models::{AnyModel, Model};
+use crate::scene::Channels;
 use crate::state::Frame;
 use crate::state::Packing;
 
@@ -27,9 +28,30 @@ impl Relaxation {
         let (pairs, forces) = (&mut frame.contacts, &mut frame.forces);
         self.model.copy_contacts(&self.packing, pairs, forces);
         frame.minimizer = self.mover.numbers();
-        // No model and no protocol of today has more.
+        // No model of today has memory, and no protocol changes the box.
         frame.memory.clear();
-        (frame.domain, frame.stage) = (None, 0);
+        (frame.domain, frame.stage) = (None, self.stage);
+    }
+
+    /// The stage of the run, counted from 0: disks that are recorded come first.
+    #[must_use]
+    pub fn stage(&self) -> u32 {
+        self.stage
+    }
+
+    /// Whether this frame is the first of a stage behind another. A run that was taken up there does not know.
+    #[must_use]
+    pub fn begins_stage(&self) -> bool {
+        self.begins_stage
+    }
+
+    /// What `channels` ask for in this stage.
+    #[must_use]
+    pub fn scheduled(&self, channels: &Channels) -> Channels {
+        match &self.next {
+            Some(scene) => channels.of_disks(scene.disks.record),
+            None => *channels,
+        }
     }
 
     /// The packing as it stands.

@@ -122,7 +122,7 @@ impl Recording {
     /// The last step whose state has been read in full.
     #[must_use]
     pub fn intact(&self) -> Option<u64> {
-        self.steps.last
+        self.steps.last()
     }
 
     /// The rows of the metrics that no state has taken along.

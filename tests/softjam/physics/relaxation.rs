@@ -4,12 +4,12 @@ use crate::common::{
     answer, assert_at_most, assert_within, converged, largest_difference, median, monodisperse,
     scene,
 };
-use softjam::models::disks::DiskParameters;
 use softjam::models::droplet::contact::Rule;
 use softjam::models::droplet::contact::solver::Method;
 use softjam::numerics::threads;
 use softjam::protocol::relax_disks;
 use softjam::protocol::{Relaxation, Status};
+use softjam::scene::DiskParameters;
 use softjam::scene::{Radii, Scene, Start, start};
 use softjam::state::Frame;
 use std::sync::atomic::{AtomicU32, Ordering};

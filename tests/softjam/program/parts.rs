@@ -146,7 +146,7 @@ fn a_run_from_a_file_is_not_taken_up_where_its_replay_would_have_nothing_to_run(
 }
 
 /// A run whose pictures are not at the steps of its states, in both formats, and what is left of it when it is cut.
-fn whole_and_cut(folder: &Path) {
+fn whole_and_cut(folder: &Path, disks: &[&str], share: usize) {
     let channels = "metrics,state=every:4,contours=every:3,contacts=every:6";
     let flags = [
         "--redraw",
@@ -156,10 +156,10 @@ fn whole_and_cut(folder: &Path) {
         "--mcap",
         "whole.mcap",
     ];
-    record(folder, "whole.rrd", &flags);
+    record(folder, "whole.rrd", &[&flags, disks].concat());
     for format in ["rrd", "mcap"] {
         let bytes = fs::read(folder.join(format!("whole.{format}"))).expect("bytes");
-        let cut = bytes.len() * 9 / 10;
+        let cut = bytes.len() * share / 10;
         fs::write(folder.join(format!("killed.{format}")), &bytes[..cut]).expect("written");
     }
 }
@@ -167,7 +167,7 @@ fn whole_and_cut(folder: &Path) {
 #[test]
 fn what_is_left_of_a_killed_run_and_its_rest_are_joined_to_the_bytes_of_the_whole() {
     let folder = folder();
-    whole_and_cut(folder.path());
+    whole_and_cut(folder.path(), &[], 9);
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect(name);
     let good = |line: &[&str]| {
         let (code, _, errors) = run(folder.path(), line);
@@ -233,6 +233,30 @@ fn what_is_left_of_a_killed_run_and_its_rest_are_joined_to_the_bytes_of_the_whol
 }
 
 #[test]
+fn a_run_killed_among_its_recorded_disks_and_its_rest_are_joined_to_the_bytes_of_the_whole() {
+    let folder = folder();
+    // Cut in the first stage, and in the second.
+    for share in [2, 8] {
+        whole_and_cut(folder.path(), &["-f", "--record-disks", "every:7"], share);
+        for format in ["rrd", "mcap"] {
+            let (killed, rest) = (format!("killed.{format}"), format!("rest.{format}"));
+            for line in [
+                ["record", "-f", "--from", &killed, "-o", &rest],
+                ["join", "-f", &killed, &rest, "-o", "joined.rrd"],
+            ] {
+                let (code, _, errors) = run(folder.path(), &line);
+                assert_eq!(code, Some(0), "{line:?}: {errors}");
+            }
+            let bytes = |name: &str| fs::read(folder.path().join(name)).expect(name);
+            assert!(
+                bytes("joined.rrd") == bytes("whole.rrd"),
+                "{format}, {share}"
+            );
+        }
+    }
+}
+
+#[test]
 fn an_interrupted_run_and_its_rest_are_joined_to_the_bytes_of_the_whole() {
     use softjam::record::{Header, Writer, record};
     use softjam::{protocol::Relaxation, scene::Scene};
@@ -267,7 +291,7 @@ fn an_interrupted_run_and_its_rest_are_joined_to_the_bytes_of_the_whole() {
 #[test]
 fn what_is_not_the_next_part_of_a_run_is_named_and_nothing_is_written() {
     let folder = folder();
-    whole_and_cut(folder.path());
+    whole_and_cut(folder.path(), &[], 9);
     let from = |name: &str, more: &[&str]| {
         let line = ["record", "--from", "whole.rrd", "-o", name];
         let (code, _, errors) = run(folder.path(), &[&line, more].concat());
