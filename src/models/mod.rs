@@ -1,7 +1,8 @@
 //! Models of particles: which particles touch at given positions, and what forces that takes.
 //!
 //! A model is asked for the forces of a packing by [`Model::solve`], and tells its contacts and net forces. What drives it
-//! (minimisers, protocols, analyses, recorders) knows [`Model`] and no more. [`AnyModel`] is the one that a scene names.
+//! (minimisers, protocols, analyses, recorders) goes by [`Model`], and asks which one it is only where models differ in kind.
+//! [`AnyModel`] is the one that a scene names.
 //!
 //! ```
 //! use softjam::domain::{Domain, Vec2};
