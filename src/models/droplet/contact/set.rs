@@ -1,4 +1,5 @@
-//! The set of contacts, with their forces: the only place that says which pairs are in contact.
+//! The set of contacts, with their forces: it says which pairs are in contact. Whoever changes that (`law/exchange.rs`) tells geometry
+//! and matrix.
 //!
 //! - A contact's number is its place in `pairs` and in `forces`, which are equally long unless the forces are lent. No pair occurs twice.
 //! - The first `sorted` pairs ascend. The others came since then, in any order.

@@ -209,24 +209,6 @@ impl ContactLaw {
         anew
     }
 
-    /// Whether so many contacts have left or come since the structure was built that it is time for a new one.
-    fn is_untidy(&self) -> bool {
-        16 * self.set.inactive().len() > self.set.len() + 256
-            || 64 * self.matrix.stragglers() > self.set.len() + 1024
-    }
-
-    /// Numbers the contacts in the order of pairs, without those that have left and with those that `came`; their structure
-    /// is to be built.
-    fn put_in_order(&mut self, came: &[([u32; 2], f64)]) {
-        if came.is_empty() && self.set.is_ordered() {
-            return;
-        }
-        self.set.sort(came);
-        self.candidates.forget();
-        self.bulges.forget();
-        self.structured = false;
-    }
-
     /// The largest `|δ|`, the scale of all residuals.
     pub(super) fn scale(&self) -> f64 {
         self.scale
@@ -373,60 +355,5 @@ impl ContactLaw {
         self.violations
             .sort_unstable_by_key(|violation| violation.pair());
         worst
-    }
-
-    /// Exchanges the first `count` violating pairs between the two sides.
-    ///
-    /// A contact that leaves becomes inactive where it is, and one that comes back becomes active; others are added behind those
-    /// that there are. Neither touches the rest of the structure.
-    pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
-        debug_assert!(
-            self.violations
-                .windows(2)
-                .all(|w| w[0].pair() < w[1].pair())
-        );
-        let mut came: Vec<([u32; 2], f64)> = Vec::new();
-        let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
-        for at in 0..count {
-            let violation = self.violations[at];
-            self.note(violation.pair(), matches!(violation, Violation::Add(..)));
-            match violation {
-                Violation::Drop(contact, _) => {
-                    left = left.max(self.geometry.overlaps()[contact].abs());
-                    self.set.deactivate(contact);
-                    self.matrix.deactivate(contact);
-                }
-                Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
-                    Some(contact) => {
-                        joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
-                        self.set.activate(contact as usize, guess);
-                        self.matrix.activate(contact as usize);
-                    }
-                    None => came.push((pair, guess)),
-                },
-            }
-        }
-        if !matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            || 32 * came.len() > self.set.len()
-        {
-            self.put_in_order(&came);
-            return;
-        }
-        for &(pair, guess) in &came {
-            self.set.add(pair, guess);
-            self.geometry.add(packing, pair);
-            joined = joined.max(self.geometry.overlaps()[self.set.len() - 1].abs());
-            let duplicate = self.geometry.duplicate();
-            self.matrix.add(packing, duplicate, pair, self.line_tension);
-        }
-        if left >= self.scale {
-            let all = 0..self.matrix.len();
-            self.scale = self.matrix.largest_overlap(&self.geometry, all);
-        }
-        self.scale = self.scale.max(joined);
-        if self.set.is_ordered() {
-            self.matrix.make_whole();
-        }
-        self.candidates.remove(came.iter().map(|c| c.0));
     }
 }

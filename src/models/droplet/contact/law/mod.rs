@@ -1,10 +1,12 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 //!
-//! - The [set](super::set) alone says which pairs are in contact; geometry and matrix have its numbers once it is `structured`.
+//! - The [set](super::set) says which pairs are in contact. It changes in [`exchange`] alone, where geometry and matrix follow: once
+//!   they are `structured` they have its numbers, and the inactive contacts of one are those of the other.
 //! - Geometry and matrix are of the positions solved last once the set is `assembled`.
 //! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
 pub mod complementarity;
+mod exchange;
 #[cfg(test)]
 mod history;
 mod local_region;
@@ -24,7 +26,7 @@ use crate::state::Packing;
 pub(super) use complementarity::Violation;
 use core::f64::consts::PI;
 use local_region::LocalRegion;
-use ordered::{Ordered, name_of};
+use ordered::Ordered;
 use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
@@ -230,22 +232,6 @@ impl ContactLaw {
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
-    }
-
-    fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.ordered.take();
-        let known = self.set.is_ordered() && self.set.pairs() == pairs;
-        if !known || !self.candidates.is_of(packing) {
-            self.set.replace(pairs);
-            self.candidates.forget();
-            self.bulges.forget();
-            self.structured = false;
-            let set = name_of(pairs);
-            self.sets = (set, set);
-        }
-        self.changes.clear();
-        self.sets.0 = self.sets.1;
-        self.set.replace_forces(forces);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest

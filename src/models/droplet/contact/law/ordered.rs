@@ -83,12 +83,6 @@ impl ContactLaw {
         self.sets
     }
 
-    /// Takes note of a contact that comes or goes.
-    pub(super) fn note(&mut self, pair: [u32; 2], came: bool) {
-        self.changes.push((pair, came));
-        self.sets.1 ^= name(pair);
-    }
-
     /// Number of contacts.
     pub(crate) fn contact_count(&self) -> usize {
         self.set.active()
@@ -135,18 +129,4 @@ impl Ordered {
             whole.of_some(&self.order, &list, &geometry)
         })
     }
-}
-
-/// The name of a set of contacts; see [`ContactLaw::sets`].
-pub(super) fn name_of(pairs: &[[u32; 2]]) -> u64 {
-    pairs.iter().fold(0, |set, pair| set ^ name(*pair))
-}
-
-/// A pair's part in the name of a set of contacts: the finalizer of SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA
-/// 2014).
-fn name([i, j]: [u32; 2]) -> u64 {
-    let mut x = (u64::from(i) << 32 | u64::from(j)).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
 }

@@ -100,7 +100,7 @@ impl ContactMatrix {
 
     /// Places for the blocks.
     fn lay_out(&mut self, duplicate: &DuplicateContactList) {
-        (self.changed, self.lacks_values) = (false, true);
+        self.lacks_values = true;
         self.sort_blocks(duplicate);
         self.block_of.clear();
         self.block_of.resize(duplicate.particles(), NO_BLOCK);
@@ -130,7 +130,6 @@ impl ContactMatrix {
         pair: [u32; 2],
         line_tension: f64,
     ) {
-        self.changed = true;
         let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
@@ -186,20 +185,15 @@ impl ContactMatrix {
         self.end.copy_within(ends..ends + z, run.end + z * to);
     }
 
-    /// All contacts are active and none was added: the contacts are those that the structure was built of.
-    pub(crate) fn make_whole(&mut self) {
-        self.changed = false;
-    }
-
     /// Corrections leave the force of contact `c`, which takes no part in them.
     pub(crate) fn deactivate(&mut self, c: usize) {
-        (self.changed, self.lacks_values) = (true, true);
+        self.lacks_values = true;
         self.scaling[c] = 0.0;
     }
 
     /// Corrections reach contact `c` again.
     pub(crate) fn activate(&mut self, c: usize) {
-        (self.changed, self.lacks_values) = (true, true);
+        self.lacks_values = true;
         self.scaling[c] = root_of_inverse(self.diagonal[c]);
     }
 

@@ -98,8 +98,6 @@ pub struct ContactMatrix {
     block_of: Vec<u32>,
     /// The particles of each contact.
     pairs: Vec<[u32; 2]>,
-    /// Whether a contact was added or is inactive.
-    changed: bool,
 }
 
 /// What entries are computed in.
@@ -156,9 +154,9 @@ impl ContactMatrix {
         self.units.rounding
     }
 
-    /// Whether the contacts are those that the structure was built of, in their order.
+    /// Whether the contacts are those that the structure was built of, in their order, and all active.
     pub(crate) fn is_whole(&self) -> bool {
-        !self.changed
+        self.stragglers() == 0 && self.scaling.iter().all(|s| *s > 0.0)
     }
 
     /// The contacts that the structure was built of come first, this many, in the order of pairs.
@@ -174,6 +172,11 @@ impl ContactMatrix {
     /// How many blocks stand alone because contacts were added.
     pub(crate) fn stragglers(&self) -> usize {
         self.runs.len() - self.sorted
+    }
+
+    /// The particles of each contact.
+    pub(super) fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs
     }
 
     /// Number of rows, the number of contacts.
