@@ -28,11 +28,11 @@ use core::f64::consts::PI;
 /// ```
 #[must_use]
 pub fn due_tolerance(packing: &Packing, overlaps: &[f64], f_max: f64, tolerance: f64) -> f64 {
-    let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-    relative_tolerance(tolerance, slack(packing, f_max), scale)
+    let largest = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+    relative_tolerance(tolerance, slack(packing, f_max), largest)
 }
 
-/// How many tolerances a residual may have: see [`ContactLaw::accepted_residual`].
+/// How many tolerances a residual may have: see [`ContactLaw::accepted_residual`](super::ContactLaw::accepted_residual).
 pub(crate) const ACCEPTED: f64 = 16.0;
 
 /// The error of a contact force that is allowed far from balance, as a part of the largest net force.
@@ -54,7 +54,8 @@ pub(super) fn slack(packing: &Packing, f_max: f64) -> f64 {
     FORCE_ERROR * f_max * (1.5 / PI) * packing.smallest_radius()
 }
 
-pub(super) fn relative_tolerance(tolerance: f64, slack: f64, scale: f64) -> f64 {
-    let loose = if scale > 0.0 { slack / scale } else { 0.0 };
+/// The tolerance relative to the `largest` overlap (length), where a residual may be as large as `slack` (length).
+pub(super) fn relative_tolerance(tolerance: f64, slack: f64, largest: f64) -> f64 {
+    let loose = if largest > 0.0 { slack / largest } else { 0.0 };
     tolerance.max(loose.min(LOOSEST))
 }

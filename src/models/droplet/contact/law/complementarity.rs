@@ -79,8 +79,7 @@ impl ContactLaw {
                 updates -= 1;
                 if self.update_locally(packing) {
                     self.assemble(packing);
-                    let (scale, worst) = (self.scale(), self.equation.max(self.tolerated));
-                    self.residual = if scale > 0.0 { worst / scale } else { worst };
+                    self.residual = self.relative(self.equation.max(self.tolerated));
                     return Ok(());
                 }
                 continue;
@@ -105,8 +104,8 @@ impl ContactLaw {
 
     /// What the first residual of a solution has to be computed in, going by the contacts found last.
     fn precision_for(&self, packing: &Packing) -> Precision {
-        let scale = self.scale();
-        let coarse = self.slack > 0.0 && self.allowed(scale) >= COARSE * rounding(packing) * scale;
+        let coarse = COARSE * rounding(packing) * self.largest_overlap;
+        let coarse = self.slack > 0.0 && self.allowed() >= coarse;
         if coarse && matches!(self.solver, LinearSolver::ConjugateGradient(_)) {
             Precision::Single
         } else {
@@ -116,10 +115,14 @@ impl ContactLaw {
 
     /// Whether few pairs violate the law, and the tolerance is one that a sum of residuals may be held against.
     fn is_local(&self) -> bool {
-        let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
+            && self.is_far_above_round_off()
             && 64 * self.violations.len() <= self.set.active()
+    }
+
+    /// Whether round-off in a residual does not matter.
+    fn is_far_above_round_off(&self) -> bool {
+        self.allowed() > FAR_ABOVE_ROUND_OFF * self.largest_overlap
     }
 
     /// Forces of the set, and the pairs that violate the law, in the order of the list.
@@ -138,9 +141,7 @@ impl ContactLaw {
 
     /// Solves `A f = δ` of the set; returns the iterations. `multiplied` says that `products` are of the forces.
     fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
-        let scale = self.scale();
-        let tolerance = self.allowed(scale);
-        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
+        let (tolerance, loosely) = (self.allowed(), self.is_far_above_round_off());
         let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
         let in_single = self.precision == Precision::Single;
         if !multiplied && in_single {
@@ -201,17 +202,12 @@ impl ContactLaw {
         if anew {
             let (geometry, products) = (&mut self.geometry, &mut self.products);
             let at = (packing, self.set.pairs(), self.set.forces());
-            self.scale = self.matrix.assemble(geometry, at, products, self.precision);
+            self.largest_overlap = self.matrix.assemble(geometry, at, products, self.precision);
             self.work.singles += u64::from(self.precision == Precision::Single);
             self.work.assemblies += 1;
             (self.structured, self.assembled) = (true, true);
         }
         anew
-    }
-
-    /// The largest `|δ|`, the scale of all residuals.
-    pub(super) fn scale(&self) -> f64 {
-        self.scale
     }
 
     /// `max |A f − δ|` of the forces.
@@ -221,7 +217,7 @@ impl ContactLaw {
         self.matrix.multiply(self.set.forces(), &mut self.image);
         self.equation = 0.0;
         let rows = self.image.iter().zip(self.geometry.overlaps());
-        for ((q, d), s) in rows.zip(self.matrix.scaling()) {
+        for ((q, d), s) in rows.zip(self.matrix.inverse_root()) {
             if *s > 0.0 {
                 self.equation = self.equation.max((d - q).abs());
             }
@@ -230,11 +226,19 @@ impl ContactLaw {
 
     /// Measures how far the forces are from the contact law, and lists the pairs that violate it.
     pub(super) fn inspect(&mut self, packing: &Packing) {
-        let scale = self.scale();
         self.bound_bulges(packing);
-        let tolerance = self.passed_over(scale);
+        let tolerance = self.passed_over();
         let worst = self.equation.max(self.find_violations(packing, tolerance));
-        self.residual = if scale > 0.0 { worst / scale } else { worst };
+        self.residual = self.relative(worst);
+    }
+
+    /// A length in units of the largest overlap.
+    fn relative(&self, length: f64) -> f64 {
+        if self.largest_overlap > 0.0 {
+            length / self.largest_overlap
+        } else {
+            length
+        }
     }
 
     /// `B_i`, and a neighbour list that covers the largest of them.
@@ -269,7 +273,7 @@ impl ContactLaw {
             self.bulges.largest() <= self.candidates.covered(),
             "pairs in reach are listed"
         );
-        let tolerance = ACCEPTED * self.allowed(self.scale());
+        let tolerance = ACCEPTED * self.allowed();
         let loaded = Loaded {
             packing,
             geometry: &self.geometry,
@@ -302,14 +306,14 @@ impl ContactLaw {
         self.violations.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
-        let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
+        let pulls = |f: f64, inverse_root: f64| f <= 0.0 && inverse_root > 0.0;
         let rows = self
             .set
             .forces()
             .chunks(64)
-            .zip(self.matrix.scaling().chunks(64));
-        for (k, (forces, scaling)) in rows.enumerate() {
-            let rows = || forces.iter().zip(scaling);
+            .zip(self.matrix.inverse_root().chunks(64));
+        for (k, (forces, roots)) in rows.enumerate() {
+            let rows = || forces.iter().zip(roots);
             let any = wide(
                 #[inline(always)]
                 || rows().fold(false, |any, (f, s)| any | (pulls(*f, *s))),

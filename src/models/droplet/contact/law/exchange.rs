@@ -66,11 +66,11 @@ impl ContactLaw {
             let duplicate = self.geometry.duplicate();
             self.matrix.add(packing, duplicate, pair, self.line_tension);
         }
-        if left >= self.scale {
+        if left >= self.largest_overlap {
             let all = 0..self.matrix.len();
-            self.scale = self.matrix.largest_overlap(&self.geometry, all);
+            self.largest_overlap = self.matrix.largest_overlap(&self.geometry, all);
         }
-        self.scale = self.scale.max(joined);
+        self.largest_overlap = self.largest_overlap.max(joined);
         self.candidates.remove(came.iter().map(|c| c.0));
         debug_assert!(self.columns_agree());
     }
@@ -100,7 +100,7 @@ impl ContactLaw {
 
     /// Whether geometry and matrix have the contacts of the set by its numbers, and the same of them are inactive.
     fn columns_agree(&self) -> bool {
-        let inactive = |c: &u32| self.matrix.scaling()[*c as usize] == 0.0;
+        let inactive = |c: &u32| self.matrix.inverse_root()[*c as usize] == 0.0;
         self.geometry.overlaps().len() == self.set.len()
             && self.matrix.pairs() == self.set.pairs()
             && (0..self.set.len() as u32)

@@ -1,6 +1,6 @@
 //! A region of contacts on which the forces are corrected: see [`local_update`](super::local_update).
 //!
-//! - A contact's number is that of the set; contacts that came in this local update follow behind.
+//! - A contact's number is that of the set; contacts that came in this local update follow after.
 //! - `place` of a contact is its row in `rows` and `contacts`, or `NOWHERE`, or `GONE` if it is inactive.
 //! - A particle with a block has all its active contacts in the region; a contact may have one particle without.
 //! - Between local updates the region is empty, every `place` is `NOWHERE` and every `left_of` is 0.
@@ -264,11 +264,11 @@ impl LocalRegion {
         }
         self.room = contacts;
         self.ends.push(self.member.len());
-        let scale = -whole.packing.radii()[i] * whole.per_radius;
+        let factor = -whole.packing.radii()[i] * whole.per_radius;
         let toward = &self.toward[first..];
         for b in 1..toward.len() {
             for a in &toward[..b] {
-                self.value.push(scale * a.g_between(toward[b]));
+                self.value.push(factor * a.g_between(toward[b]));
             }
         }
     }
@@ -302,13 +302,13 @@ impl LocalRegion {
             let Some(own) = self.direction_at(whole, p, contact) else {
                 continue;
             };
-            let scale = -whole.packing.radii()[p as usize] * whole.per_radius;
+            let factor = -whole.packing.radii()[p as usize] * whole.per_radius;
             let block = self.block[p as usize] as usize;
             let first = if block == 0 { 0 } else { self.ends[block - 1] };
             for k in first..self.ends[block] {
                 let place = self.member[k];
                 if self.contacts[place as usize] as usize != contact {
-                    let entry = scale * own.g_between(self.toward[k]);
+                    let entry = factor * own.g_between(self.toward[k]);
                     self.rows[place as usize].residual -= entry * change;
                 }
             }

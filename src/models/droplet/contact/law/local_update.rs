@@ -68,8 +68,8 @@ impl ContactLaw {
     }
 
     fn update_in(&mut self, packing: &Packing, region: &mut LocalRegion) -> bool {
-        let allowed = self.allowed(self.scale());
-        let (before, tolerance) = (self.equation, self.passed_over(self.scale()));
+        let allowed = self.allowed();
+        let (before, tolerance) = (self.equation, self.passed_over());
         let per_radius = self.per_radius();
         for _ in 0..ROUNDS {
             self.work.local_updates += 1;

@@ -108,7 +108,7 @@ pub struct ContactLaw {
     diverged: Option<(usize, f64)>,
     violations: Vec<Violation>,
     /// The largest `|δ|` of the contacts (length).
-    scale: f64,
+    largest_overlap: f64,
     /// The largest `|A f − δ|` (length).
     equation: f64,
     residual: f64,
@@ -182,7 +182,7 @@ impl ContactLaw {
             region: LocalRegion::default(),
             diverged: None,
             violations: Vec::new(),
-            scale: 0.0,
+            largest_overlap: 0.0,
             equation: 0.0,
             residual: 0.0,
             work: Work::default(),
@@ -228,7 +228,7 @@ impl ContactLaw {
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
         self.assembled = false;
-        self.candidates.move_by(f64::INFINITY);
+        self.candidates.note_motion(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
@@ -320,7 +320,7 @@ impl ContactLaw {
         self.changes.clear();
         self.sets.0 = self.sets.1;
         self.assembled = false;
-        self.candidates.move_by(moved);
+        self.candidates.note_motion(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {
@@ -349,8 +349,7 @@ impl ContactLaw {
 
     /// The forces of an unfinished exchange can be anything; only an answer is held against the box.
     fn check_answer(&self, packing: &Packing) -> Result<(), ContactError> {
-        let scale = self.scale();
-        if self.residual * scale <= ACCEPTED * self.allowed(scale) {
+        if self.residual * self.largest_overlap <= ACCEPTED * self.allowed() {
             self.check_images(packing)?;
         }
         Ok(())
@@ -362,7 +361,7 @@ impl ContactLaw {
     pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
         match self.rule {
             Rule::Complementarity => {
-                relative_tolerance(self.tolerance, slack(packing, f_max), self.scale())
+                relative_tolerance(self.tolerance, slack(packing, f_max), self.largest_overlap)
             }
             Rule::Saitoh => self.tolerance,
         }
@@ -370,14 +369,14 @@ impl ContactLaw {
 
     /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
     /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
-    fn passed_over(&self, scale: f64) -> f64 {
+    fn passed_over(&self) -> f64 {
         let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
-        part * ACCEPTED * self.allowed(scale)
+        part * ACCEPTED * self.allowed()
     }
 
-    /// The residual looked for, as a length; `scale` is the largest `|δ|`.
-    fn allowed(&self, scale: f64) -> f64 {
-        scale * relative_tolerance(self.tolerance, self.slack, scale)
+    /// The residual looked for, as a length.
+    fn allowed(&self) -> f64 {
+        self.largest_overlap * relative_tolerance(self.tolerance, self.slack, self.largest_overlap)
     }
 }
 

@@ -83,15 +83,15 @@ impl ContactMatrix {
             load: root * line_tension,
             rounding: rounding(packing),
         };
-        self.scaling.resize(contacts.len(), 0.0);
-        self.scale.clear();
-        let scale = |r: &f64| -r * per_radius;
-        self.scale.extend(radii.iter().map(scale));
+        self.inverse_root.resize(contacts.len(), 0.0);
+        self.factor.clear();
+        let factor = |r: &f64| -r * per_radius;
+        self.factor.extend(radii.iter().map(factor));
         wide(
             #[inline(always)]
             || {
-                for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
-                    *scaling = root_of_inverse(*compliance);
+                for (root, compliance) in self.inverse_root.iter_mut().zip(&self.diagonal) {
+                    *root = root_of_inverse(*compliance);
                 }
             },
         );
@@ -117,7 +117,7 @@ impl ContactMatrix {
             (end, value) = (run.ends().end, run.values().end);
         }
         self.value.resize(value, 0.0);
-        self.scaled.resize(value, 0.0);
+        self.entries_f32.resize(value, 0.0);
         self.operands.resize(self.pairs.len(), Operand::default());
         self.loads.resize(self.pairs.len(), 0.0);
     }
@@ -136,7 +136,7 @@ impl ContactMatrix {
         let compliance = compliance(per_radius, sum);
         self.pairs.push(pair);
         self.diagonal.push(compliance);
-        self.scaling.push(root_of_inverse(compliance));
+        self.inverse_root.push(root_of_inverse(compliance));
         self.operands.push(Operand::default());
         self.loads.push(0.0);
         for p in pair {
@@ -153,7 +153,7 @@ impl ContactMatrix {
             let row = duplicate.entries(p as usize);
             self.end.extend(duplicate.ends(p, row));
             self.value.resize(run.values().end, 0.0);
-            self.scaled.resize(run.values().end, 0.0);
+            self.entries_f32.resize(run.values().end, 0.0);
             self.runs.push(run);
         }
         self.lacks_values = true;
@@ -188,13 +188,13 @@ impl ContactMatrix {
     /// Corrections leave the force of contact `c`, which takes no part in them.
     pub(crate) fn deactivate(&mut self, c: usize) {
         self.lacks_values = true;
-        self.scaling[c] = 0.0;
+        self.inverse_root[c] = 0.0;
     }
 
     /// Corrections reach contact `c` again.
     pub(crate) fn activate(&mut self, c: usize) {
         self.lacks_values = true;
-        self.scaling[c] = root_of_inverse(self.diagonal[c]);
+        self.inverse_root[c] = root_of_inverse(self.diagonal[c]);
     }
 
     /// The order of the blocks: within each stretch of particles by size, then by particle.
@@ -224,13 +224,13 @@ impl ContactMatrix {
                 self.particle[*slot] = p as u32;
                 *slot += 1;
             }
-            let behind = stretch.end as u32;
+            let after = stretch.end as u32;
             let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
             self.runs.extend(large.map(|z| Run::of(z, 1)));
-            let contacts = self.pairs.partition_point(|pair| pair[0] < behind);
+            let contacts = self.pairs.partition_point(|pair| pair[0] < after);
             self.stretches.push([self.runs.len(), contacts]);
         }
-        self.sorted = self.runs.len();
+        self.sorted_runs = self.runs.len();
     }
 
     /// The matrix of those contacts alone that are active: `order` has their numbers, `contacts` them in this order, and
@@ -244,8 +244,8 @@ impl ContactMatrix {
         let of_these = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
         let mut some = Self {
             diagonal: of_these(&self.diagonal),
-            scaling: of_these(&self.scaling),
-            scale: self.scale.clone(),
+            inverse_root: of_these(&self.inverse_root),
+            factor: self.factor.clone(),
             pairs: contacts.pairs().collect(),
             largest_root: self.largest_root,
             units: self.units,

@@ -1,9 +1,9 @@
 //! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
 //!
-//! - Rows are the numbers of the contacts. An inactive contact has a row, whose scaling is 0.
+//! - Rows are the numbers of the contacts. An inactive contact has a row, whose inverse root is 0.
 //! - A particle with contacts has one block; a block names its contacts in the order of the particle's partners.
-//! - The first `sorted` runs hold whole stretches of particles. A block that a contact was added to stands behind them, alone.
-//! - Behind an assembly `scaled` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
+//! - The first `sorted_runs` hold whole stretches of particles. A block that a contact was added to stands after them, alone.
+//! - After an assembly `entries_f32` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
 //!
 //! See the example of [`ContactMatrix`].
 
@@ -65,23 +65,23 @@ pub struct ContactMatrix {
     /// `A_cc` (length per force).
     diagonal: Vec<f64>,
     /// `A_cc^(−½)`, and 0 for an inactive contact.
-    scaling: Vec<f64>,
+    inverse_root: Vec<f64>,
     /// A bound of `A_cc^½`.
     largest_root: f64,
     /// Runs of blocks of one size.
     runs: Vec<Run>,
     /// How many of the runs were sorted when the structure was built.
-    sorted: usize,
+    sorted_runs: usize,
     /// The particle of each block.
     particle: Vec<u32>,
     /// The ends of contacts in the blocks: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
     end: Vec<u32>,
-    /// `−R_p/2πγ` of each particle.
-    scale: Vec<f64>,
+    /// `−R_p/2πγ` of each particle: what `g` is multiplied with.
+    factor: Vec<f64>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for inactive contacts.
-    scaled: Vec<f32>,
+    entries_f32: Vec<f32>,
     /// What entries in single precision are computed from, see [`entries_f32`].
     operands: Vec<Operand>,
     /// `A_cc^½ f_c`, in units of `units.load`: what entries in single precision are multiplied with first.
@@ -156,7 +156,7 @@ impl ContactMatrix {
 
     /// Whether the contacts are those that the structure was built of, in their order, and all active.
     pub(crate) fn is_whole(&self) -> bool {
-        self.stragglers() == 0 && self.scaling.iter().all(|s| *s > 0.0)
+        self.stragglers() == 0 && self.inverse_root.iter().all(|s| *s > 0.0)
     }
 
     /// The contacts that the structure was built of come first, this many, in the order of pairs.
@@ -171,7 +171,7 @@ impl ContactMatrix {
 
     /// How many blocks stand alone because contacts were added.
     pub(crate) fn stragglers(&self) -> usize {
-        self.runs.len() - self.sorted
+        self.runs.len() - self.sorted_runs
     }
 
     /// The particles of each contact.
@@ -198,8 +198,8 @@ impl ContactMatrix {
     }
 
     /// `A_cc^(−½)`.
-    pub(crate) fn scaling(&self) -> &[f64] {
-        &self.scaling
+    pub(crate) fn inverse_root(&self) -> &[f64] {
+        &self.inverse_root
     }
 
     /// A bound of `A_cc^½`, from the largest radius.
@@ -306,7 +306,7 @@ impl ContactMatrix {
     }
 
     /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision and in the places of the others.
-    pub(crate) fn scaled(&self) -> &[f32] {
-        &self.scaled
+    pub(crate) fn entries_f32(&self) -> &[f32] {
+        &self.entries_f32
     }
 }

@@ -17,7 +17,7 @@ pub struct ConjugateGradient {
     image: Products<f64>,
     largest: f64,
     /// `max |D^(−½) r|` of the residual that was computed last.
-    scaled: f64,
+    largest_weighted: f64,
     single: Single,
 }
 
@@ -111,7 +111,7 @@ impl ConjugateGradient {
             if iterations > 0 && self.largest > 0.5 * before {
                 return Ok(Progress::NeedsWhole(iterations));
             }
-            let residual = (&self.residual[..], self.scaled);
+            let residual = (&self.residual[..], self.largest_weighted);
             let corrected = self.single.correct(matrix, residual, forces, tolerance);
             let Some((more, bound)) = corrected else {
                 return Ok(Progress::NeedsWhole(iterations));
@@ -185,11 +185,11 @@ impl ConjugateGradient {
         columns: (&[f64], &[f64], &[Q]),
         unit: f64,
     ) -> (f64, f64) {
-        let [largest, scaled, load] = wide(
+        let [largest, weighted, load] = wide(
             #[inline(always)]
             || subtract(&mut self.residual, matrix, columns, unit),
         );
-        self.scaled = scaled;
+        self.largest_weighted = weighted;
         (largest, load)
     }
 
@@ -215,15 +215,15 @@ impl ConjugateGradient {
         tolerance: f64,
         most: usize,
     ) -> Result<usize, SolverError> {
-        let scaling = matrix.scaling();
+        let roots = matrix.inverse_root();
         let mut rz = 0.0;
-        for (r, s) in self.residual.iter().zip(scaling) {
+        for (r, s) in self.residual.iter().zip(roots) {
             rz += r * r * (s * s);
         }
         self.direction.fill(0.0);
         let mut beta = 0.0;
         for iteration in 1..=most {
-            for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(scaling) {
+            for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(roots) {
                 *p = r * (s * s) + beta * *p;
             }
             matrix.multiply_into(&self.direction, &mut self.image);
@@ -240,7 +240,7 @@ impl ConjugateGradient {
                 forces,
                 &mut self.residual,
                 (&self.direction, self.image.sums()),
-                scaling,
+                roots,
                 alpha,
             );
             self.largest = largest;
@@ -257,8 +257,8 @@ impl ConjugateGradient {
 
 /// A product of the off-diagonal entries in a row.
 trait Product: Copy {
-    /// As a length, in a row with this diagonal and scaling.
-    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64;
+    /// As a length, in a row with this diagonal and inverse root.
+    fn length(self, diagonal: f64, inverse_root: f64, unit: f64) -> f64;
 }
 
 impl Product for f64 {
@@ -270,8 +270,8 @@ impl Product for f64 {
 
 impl Product for f32 {
     #[inline(always)]
-    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64 {
-        f64::from(self) * (unit * (diagonal * scaling))
+    fn length(self, diagonal: f64, inverse_root: f64, unit: f64) -> f64 {
+        f64::from(self) * (unit * (diagonal * inverse_root))
     }
 }
 
@@ -294,19 +294,19 @@ fn subtract<Q: Product>(
     let (f8, f_rest) = forces.as_chunks::<8>();
     let (q8, q_rest) = products.as_chunks::<8>();
     let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
-    let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
-    let (mut largest, mut scaled, mut load) = ([0.0; 8], [0.0; 8], [0.0; 8]);
+    let (s8, s_rest) = matrix.inverse_root().as_chunks::<8>();
+    let (mut largest, mut weighted, mut load) = ([0.0; 8], [0.0; 8], [0.0; 8]);
     let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(q8));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
             let af = a[k] * f[k];
             r[k] = left(d[k], af, q[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
-            scaled[k] = larger(scaled[k], (r[k] * s[k]).abs());
+            weighted[k] = larger(weighted[k], (r[k] * s[k]).abs());
             load[k] = larger(load[k], af.abs());
         }
     }
-    let mut most = [largest, scaled, load].map(
+    let mut most = [largest, weighted, load].map(
         #[inline(always)]
         |most| most.into_iter().fold(0.0, larger),
     );
@@ -321,20 +321,20 @@ fn subtract<Q: Product>(
     most
 }
 
-/// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` behind it. The sum has four chains.
+/// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` after it. The sum has four chains.
 #[inline(always)]
 fn advance(
     forces: &mut [f64],
     residual: &mut [f64],
     (direction, image): (&[f64], &[f64]),
-    scaling: &[f64],
+    roots: &[f64],
     alpha: f64,
 ) -> (f64, f64) {
     let (f4, f_rest) = forces.as_chunks_mut::<4>();
     let (r4, r_rest) = residual.as_chunks_mut::<4>();
     let (p4, p_rest) = direction.as_chunks::<4>();
     let (q4, q_rest) = image.as_chunks::<4>();
-    let (w4, w_rest) = scaling.as_chunks::<4>();
+    let (w4, w_rest) = roots.as_chunks::<4>();
     let (mut sums, mut largest) = ([0.0; 4], [0.0f64; 4]);
     for ((((f, r), p), q), w) in f4.iter_mut().zip(r4).zip(p4).zip(q4).zip(w4) {
         for k in 0..4 {
