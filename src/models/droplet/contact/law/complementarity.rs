@@ -24,12 +24,9 @@
 
 use super::ContactLaw;
 use crate::models::droplet::contact::error::ContactError;
-use crate::models::droplet::contact::list::ContactList;
-use crate::models::droplet::contact::matrix::Precision;
-use crate::models::droplet::contact::matrix::rounding;
 use crate::models::droplet::contact::search::Conditions;
 use crate::models::droplet::contact::second_image::{Loaded, second_image};
-use crate::models::droplet::contact::solver::{LinearSolver, Progress, SolverError};
+use crate::models::droplet::contact::solver::LinearSolver;
 use crate::models::droplet::contact::tolerance::ACCEPTED;
 use crate::numerics::threads::both;
 use crate::numerics::wide::wide;
@@ -37,12 +34,6 @@ use crate::state::Packing;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. Conditions φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
-
-/// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
-const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
-
-/// How many times the rounding of single precision a tolerance has to be for a solution to begin with it.
-const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,17 +93,6 @@ impl ContactLaw {
         })
     }
 
-    /// What the first residual of a solution has to be computed in, going by the contacts found last.
-    fn precision_for(&self, packing: &Packing) -> Precision {
-        let coarse = COARSE * rounding(packing) * self.largest_overlap;
-        let coarse = self.slack > 0.0 && self.allowed() >= coarse;
-        if coarse && matches!(self.solver, LinearSolver::ConjugateGradient(_)) {
-            Precision::Single
-        } else {
-            Precision::Double
-        }
-    }
-
     /// Whether few pairs violate the law, and the tolerance is one that a sum of residuals may be held against.
     fn is_local(&self) -> bool {
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
@@ -120,108 +100,12 @@ impl ContactLaw {
             && 64 * self.violations.len() <= self.set.active()
     }
 
-    /// Whether round-off in a residual does not matter.
-    fn is_far_above_round_off(&self) -> bool {
-        self.allowed() > FAR_ABOVE_ROUND_OFF * self.largest_overlap
-    }
-
     /// Forces of the set, and the pairs that violate the law, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
-        let multiplied = self.assemble(packing);
-        let iterations = self.find_forces(packing, multiplied)?;
-        self.work.iterations += iterations as u64;
-        match self.solver.largest_residual() {
-            Some(largest) => self.equation = largest,
-            None => self.measure_equation(),
-        }
+        self.find_forces(packing)?;
         self.inspect(packing);
         Ok(())
-    }
-
-    /// Solves `A f = δ` of the set; returns the iterations. `multiplied` says that `products` are of the forces.
-    fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
-        let (tolerance, loosely) = (self.allowed(), self.is_far_above_round_off());
-        let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
-        let in_single = self.precision == Precision::Single;
-        if !multiplied && in_single {
-            let (geometry, products) = (&self.geometry, &mut self.products);
-            self.matrix
-                .assemble_f32(geometry, self.set.forces(), products);
-        } else if direct || !multiplied {
-            self.matrix.complete(&self.geometry);
-        }
-        let (overlaps, forces) = (self.geometry.overlaps(), self.set.forces_mut());
-        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
-        };
-        let goal = (tolerance, loosely);
-        let products = if in_single {
-            Some(self.products.single())
-        } else {
-            multiplied.then(|| self.products.double())
-        };
-        let from = (products, 0);
-        let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
-        if let Progress::NeedsValues(iterations) = progress {
-            self.matrix.complete(&self.geometry);
-            let from = (None, iterations);
-            progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
-        }
-        let iterations = match progress {
-            Progress::Done(iterations) => return Ok(iterations),
-            Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => iterations,
-        };
-        self.put_in_order(&[]);
-        self.assemble(packing);
-        self.matrix.complete(&self.geometry);
-        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            return Ok(iterations);
-        };
-        let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
-        let forces = self.set.forces_mut();
-        solver.finish(matrix, overlaps, forces, tolerance, iterations)
-    }
-
-    /// Geometry and matrix of the set at these positions; what still stands is not done again. Says whether it was
-    /// not, and `products` are those of the off-diagonal entries of `A` with the forces.
-    pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
-        if !self.assembled && self.is_untidy() {
-            self.put_in_order(&[]);
-        }
-        if !self.structured {
-            let mut list = ContactList::default();
-            list.rebuild(packing.len(), self.set.pairs());
-            self.work.structures += 1;
-            self.geometry.restructure(&list);
-            let duplicate = self.geometry.duplicate();
-            self.matrix
-                .restructure(packing, &list, duplicate, self.line_tension);
-        }
-        let anew = !(self.structured && self.assembled);
-        if anew {
-            let (geometry, products) = (&mut self.geometry, &mut self.products);
-            let at = (packing, self.set.pairs(), self.set.forces());
-            self.largest_overlap = self.matrix.assemble(geometry, at, products, self.precision);
-            self.work.singles += u64::from(self.precision == Precision::Single);
-            self.work.assemblies += 1;
-            (self.structured, self.assembled) = (true, true);
-        }
-        anew
-    }
-
-    /// `max |A f − δ|` of the forces.
-    pub(super) fn measure_equation(&mut self) {
-        self.image.resize(self.set.len(), 0.0);
-        self.matrix.complete(&self.geometry);
-        self.matrix.multiply(self.set.forces(), &mut self.image);
-        self.equation = 0.0;
-        let rows = self.image.iter().zip(self.geometry.overlaps());
-        for ((q, d), s) in rows.zip(self.matrix.inverse_root()) {
-            if *s > 0.0 {
-                self.equation = self.equation.max((d - q).abs());
-            }
-        }
     }
 
     /// Measures how far the forces are from the contact law, and lists the pairs that violate it.

@@ -1,6 +1,6 @@
 //! Where contacts come and go: the set changes here alone, and the columns of geometry and matrix with it.
 
-use super::{ContactLaw, Violation};
+use super::{ContactLaw, Standing, Violation};
 use crate::models::droplet::contact::solver::LinearSolver;
 use crate::state::Packing;
 
@@ -95,7 +95,7 @@ impl ContactLaw {
     fn renumbered(&mut self) {
         self.candidates.forget();
         self.bulges.forget();
-        self.structured = false;
+        self.standing = Standing::Outdated;
     }
 
     /// Whether geometry and matrix have the contacts of the set by its numbers, and the same of them are inactive.

@@ -222,7 +222,7 @@ fn contact_that_a_local_update_activates_is_there_in_single_precision_too() {
     let (mut x, mut image) = (vec![0.0; count], vec![0.0; count]);
     let matrix = run.matrix();
     ConjugateGradient::default()
-        .solve_to(matrix, &b, &mut x, 1e-6, true)
+        .solve_loosely(matrix, &b, &mut x, 1e-6)
         .unwrap();
     matrix.multiply(&x, &mut image);
     for (q, d) in image.iter().zip(&b) {

@@ -1,12 +1,12 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 //!
-//! - The [set](super::set) says which pairs are in contact. It changes in [`exchange`] alone, where geometry and matrix follow: once
-//!   they are `structured` they have its numbers, and the inactive contacts of one are those of the other.
-//! - Geometry and matrix are of the positions solved last once the set is `assembled`.
+//! - The [set](super::set) says which pairs are in contact. It changes in [`exchange`] alone, where geometry and matrix follow: unless
+//!   they are [outdated](Standing::Outdated) they have its numbers, and the inactive contacts of one are those of the other.
 //! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
 pub mod complementarity;
 mod exchange;
+mod forces;
 #[cfg(test)]
 mod history;
 mod local_region;
@@ -84,10 +84,7 @@ pub struct ContactLaw {
     changes: Vec<([u32; 2], bool)>,
     /// The names of the set of contacts before the last solution and now.
     sets: (u64, u64),
-    /// Whether geometry and matrix have the contacts of the set by its numbers.
-    structured: bool,
-    /// Whether geometry and matrix are of the positions at hand.
-    assembled: bool,
+    standing: Standing,
     /// The active contacts in the order of pairs, once they are asked for.
     ordered: OnceLock<Ordered>,
     candidates: Candidates,
@@ -113,6 +110,17 @@ pub struct ContactLaw {
     equation: f64,
     residual: f64,
     work: Work,
+}
+
+/// What geometry and matrix are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Standing {
+    /// Of other contacts than the set's, or of other numbers.
+    Outdated,
+    /// Of the set's contacts by their numbers, at other positions.
+    Structured,
+    /// Of the set's contacts by their numbers, at the positions at hand.
+    Assembled,
 }
 
 /// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
@@ -168,8 +176,7 @@ impl ContactLaw {
             set: ContactSet::default(),
             changes: Vec::new(),
             sets: (0, 0),
-            structured: false,
-            assembled: false,
+            standing: Standing::Outdated,
             ordered: OnceLock::new(),
             candidates: Candidates::default(),
             precision: Precision::Double,
@@ -227,11 +234,16 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
-        self.assembled = false;
-        self.candidates.note_motion(f64::INFINITY);
+        self.moved_by(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
+    }
+
+    /// The particles are elsewhere, none of them by more than `distance` (length).
+    fn moved_by(&mut self, distance: f64) {
+        self.standing = self.standing.min(Standing::Structured);
+        self.candidates.note_motion(distance);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
@@ -319,8 +331,7 @@ impl ContactLaw {
         self.ordered.take();
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.assembled = false;
-        self.candidates.note_motion(moved);
+        self.moved_by(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {

@@ -21,6 +21,26 @@ pub struct ConjugateGradient {
     single: Single,
 }
 
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Goal {
+    /// The largest residual (length).
+    pub(crate) tolerance: f64,
+    /// Whether the recurrence's own residual, with an estimate of its round-off, will do: for tolerances far above round-off. That
+    /// saves a product with the matrix.
+    pub(crate) loosely: bool,
+}
+
+/// What there is to begin with.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Start<'a> {
+    /// The products of the matrix's off-diagonal entries with the forces, if they are at hand. Those in single precision count with an
+    /// estimate of their rounding.
+    pub(crate) products: Option<First<'a>>,
+    /// The iterations done so far.
+    pub(crate) iterations: usize,
+}
+
 /// How far a solution has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
@@ -50,41 +70,53 @@ impl ConjugateGradient {
         forces: &mut [f64],
         tolerance: f64,
     ) -> Result<usize, SolverError> {
-        self.solve_to(matrix, overlaps, forces, tolerance, false)
+        let loosely = false;
+        self.solve_to(matrix, overlaps, forces, Goal { tolerance, loosely })
     }
 
-    /// [`solve`](Self::solve), `loosely` as in [`begin`](Self::begin).
-    pub(crate) fn solve_to(
+    /// [`solve`](Self::solve), [loosely](Goal::loosely).
+    pub(crate) fn solve_loosely(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
         tolerance: f64,
-        loosely: bool,
     ) -> Result<usize, SolverError> {
-        match self.begin(matrix, overlaps, forces, (tolerance, loosely), (None, 0))? {
+        let loosely = true;
+        self.solve_to(matrix, overlaps, forces, Goal { tolerance, loosely })
+    }
+
+    fn solve_to(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        goal: Goal,
+    ) -> Result<usize, SolverError> {
+        match self.begin(matrix, overlaps, forces, goal, Start::default())? {
             Progress::Done(iterations) => Ok(iterations),
             Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => {
-                self.finish(matrix, overlaps, forces, tolerance, iterations)
+                self.finish(matrix, overlaps, forces, goal.tolerance, iterations)
             }
         }
     }
 
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
-    /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
-    /// above round-off: that saves a product with the matrix. So do `products`, those of its off-diagonal entries with the
-    /// `forces`, where they are at hand; those in single precision count with an estimate of their rounding. What
-    /// [needs values](Progress::NeedsValues) goes on here with the `iterations` it had.
+    /// leave. What [needs values](Progress::NeedsValues) goes on here.
     pub(crate) fn begin(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
-        (tolerance, loosely): (f64, bool),
-        (mut products, mut iterations): (Option<First<'_>>, usize),
+        Goal { tolerance, loosely }: Goal,
+        start: Start<'_>,
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
         self.single.prepare(matrix.len());
+        let Start {
+            mut products,
+            mut iterations,
+        } = start;
         loop {
             let (before, mut rounding) = (self.largest, 0.0);
             self.largest = match products.take() {
