@@ -88,7 +88,7 @@ impl ContactLaw {
         }
         Err(ContactError::Unsettled {
             offending: self.violations.len(),
-            contacts: self.set.active(),
+            contacts: self.set.active_count(),
             sweeps: most,
         })
     }
@@ -97,7 +97,7 @@ impl ContactLaw {
     fn is_local(&self) -> bool {
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
             && self.is_far_above_round_off()
-            && 64 * self.violations.len() <= self.set.active()
+            && 64 * self.violations.len() <= self.set.active_count()
     }
 
     /// Forces of the set, and the pairs that violate the law, in the order of the list.

@@ -9,14 +9,13 @@ impl ContactLaw {
     pub(super) fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.ordered.take();
         let known = self.set.is_ordered() && self.set.pairs() == pairs;
+        self.set.replace(pairs, forces);
         if !known || !self.candidates.is_of(packing) {
-            self.set.replace(pairs);
             self.renumbered();
             self.sets.1 = pairs.iter().fold(0, |set, pair| set ^ name(*pair));
         }
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.set.replace_forces(forces);
     }
 
     /// Exchanges the first `count` violating pairs between the two sides.

@@ -51,7 +51,7 @@ impl ContactLaw {
                     continue;
                 };
                 region.clear();
-                let most = self.set.active() / 4;
+                let most = self.set.active_count() / 4;
                 let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
                 region.disturb(whole, contact, change);
                 let descent = region.descend(whole, 0.5 * allowed, most);

@@ -25,8 +25,8 @@ impl ContactLaw {
     pub(crate) fn copy_contacts(&self, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
         pairs.clear();
         forces.clear();
-        pairs.reserve(self.set.active());
-        forces.reserve(self.set.active());
+        pairs.reserve(self.set.active_count());
+        forces.reserve(self.set.active_count());
         for stretch in self.set.in_order() {
             pairs.extend_from_slice(&self.set.pairs()[stretch.clone()]);
             forces.extend_from_slice(&self.set.forces()[stretch]);
@@ -85,7 +85,7 @@ impl ContactLaw {
 
     /// Number of contacts.
     pub(crate) fn contact_count(&self) -> usize {
-        self.set.active()
+        self.set.active_count()
     }
 
     pub(super) fn ordered(&self) -> &Ordered {
