@@ -4,7 +4,7 @@
 //!   they are [outdated](Standing::Outdated) they have its numbers, and the inactive contacts of one are those of the other.
 //! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
-pub mod complementarity;
+mod complementarity;
 mod exchange;
 mod forces;
 #[cfg(test)]

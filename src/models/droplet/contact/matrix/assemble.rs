@@ -265,13 +265,13 @@ impl ContactMatrix {
     /// The run with which the second half of the entries begins.
     fn middle(&self) -> usize {
         let half = self.entries_f32.len() / 2;
-        self.runs.partition_point(|run| run.value < half)
+        self.runs.partition_point(|run| run.values().start < half)
     }
 
     /// What the blocks are made from, and where they go: those of the first `middle` runs, and the others.
     fn halves(&mut self, middle: usize) -> (Layout<'_>, [Filled<'_>; 2]) {
         let all = self.entries_f32.len();
-        let first = self.runs.get(middle).map_or(all, |run| run.value);
+        let first = self.runs.get(middle).map_or(all, |run| run.values().start);
         let layout = Layout {
             runs: &self.runs,
             particle: &self.particle,
@@ -402,7 +402,7 @@ impl Layout<'_> {
                 forces,
                 products,
             };
-            let particles = &self.particle[run.block..run.block + run.count];
+            let particles = &self.particle[run.blocks()];
             let factors = particles.iter().map(|p| self.factor[*p as usize]);
             match run.size {
                 1 => {}
@@ -430,7 +430,7 @@ impl Layout<'_> {
                 products,
                 scratch: &mut out.scratch.lanes,
             };
-            let particles = &self.particle[run.block..run.block + run.count];
+            let particles = &self.particle[run.blocks()];
             let radii = particles
                 .iter()
                 .map(|p| (self.factor[*p as usize] * per_radius) as f32);

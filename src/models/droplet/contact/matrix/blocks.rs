@@ -13,10 +13,10 @@ use core::ops::Range;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Run {
     pub(super) size: usize,
-    pub(super) count: usize,
-    pub(super) block: usize,
-    pub(super) end: usize,
-    pub(super) value: usize,
+    count: usize,
+    block: usize,
+    end: usize,
+    value: usize,
 }
 
 impl Run {
@@ -26,6 +26,10 @@ impl Run {
             count,
             ..Self::default()
         }
+    }
+
+    pub(super) fn blocks(&self) -> Range<usize> {
+        self.block..self.block + self.count
     }
 
     pub(super) fn ends(&self) -> Range<usize> {

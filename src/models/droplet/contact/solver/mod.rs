@@ -159,7 +159,7 @@ impl LinearSolver {
     }
 
     /// How often a pattern was analysed.
-    pub(crate) fn symbolic_factorizations(&self) -> u64 {
+    pub(super) fn symbolic_factorizations(&self) -> u64 {
         match self {
             Self::SparseCholesky(cholesky) => cholesky.symbolic_factorizations(),
             Self::ConjugateGradient(_) | Self::GaussJordan(_) => 0,
