@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_seeds_example_keeps_its_partners_in_ascending_order() {
+    fn saitohs_example_keeps_its_partners_in_ascending_order() {
         // Saitoh 2.2.2: particle i with partners 5, 2, 10, 7 is listed as {2, 5, 7, 10}.
         let mut pairs = vec![[1, 5], [1, 2], [1, 10], [1, 7], [0, 1]];
         pairs.sort_unstable();

@@ -2,9 +2,9 @@
 //!
 //! # The way to the answer
 //!
-//! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set
-//! with a negative gap ought to come. [`Rule::Complementarity`](crate::models::droplet::contact::Rule::Complementarity) exchanges them all at once and solves again, which
-//! takes one or two sweeps when the guess comes from the step before.
+//! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set with a negative
+//! gap ought to come. [`Rule::Complementarity`](super::Rule::Complementarity) exchanges them all at once and solves again, which takes
+//! one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
 //! (1994)): when three sweeps have not lowered the number of violating pairs below its best, only the *first* violating
@@ -14,11 +14,11 @@
 //!
 //! # Which pairs are looked at
 //!
-//! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
-//! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over. Their
-//! gaps are positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too
-//! wide (`bulges.rs`), cannot change a bit of the answer. The forces of an unfinished exchange can be anything, and bulges as wide as
-//! many particles; they are cut short, and then all bounds are the exact sums.
+//! A pair that is not in the set can only have a negative gap if its bulges bridge the distance: pairs with `r_ij ≥ R_i + R_j +
+//! B_i + B_j` are passed over, `B_i` being a bound of a bulge ([`bulges`](crate::models::droplet::contact::bulges)). Their gaps are
+//! positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too wide, cannot
+//! change a bit of the answer. The forces of an unfinished exchange can be anything, and bulges as wide as many particles; they are
+//! cut short, and then all bounds are the exact sums.
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
@@ -56,8 +56,9 @@ impl ContactLaw {
     /// Exchanges contacts until no pair violates the law.
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
+        const LOCAL_UPDATES: u32 = 3;
         let most = 1000 + 20 * packing.len();
-        let (mut best, mut updates) = (usize::MAX, 3);
+        let (mut best, mut updates) = (usize::MAX, LOCAL_UPDATES);
         self.precision = self.precision_for(packing);
         let mut patience = PATIENCE;
         for _ in 0..most {
@@ -87,7 +88,7 @@ impl ContactLaw {
             }
         }
         Err(ContactError::Unsettled {
-            offending: self.violations.len(),
+            violating: self.violations.len(),
             contacts: self.set.active_count(),
             sweeps: most,
         })

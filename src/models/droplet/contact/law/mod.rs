@@ -7,11 +7,11 @@
 mod complementarity;
 mod exchange;
 mod forces;
-#[cfg(test)]
-mod history;
 mod local_region;
 mod local_update;
 mod ordered;
+#[cfg(test)]
+mod tests;
 
 use crate::models::droplet::contact::bulges::Bulges;
 use crate::models::droplet::contact::candidates::Candidates;
@@ -22,9 +22,9 @@ use crate::models::droplet::contact::search::Search;
 use crate::models::droplet::contact::set::ContactSet;
 use crate::models::droplet::contact::solver::{LinearSolver, Method};
 use crate::models::droplet::contact::tolerance::{ACCEPTED, relative_tolerance, slack};
+use crate::models::droplet::kernel::per_radius;
 use crate::state::Packing;
 pub(super) use complementarity::Violation;
-use core::f64::consts::PI;
 use local_region::LocalRegion;
 use ordered::Ordered;
 use std::sync::OnceLock;
@@ -209,7 +209,7 @@ impl ContactLaw {
 
     /// `1/2πγ`.
     fn per_radius(&self) -> f64 {
-        1.0 / (2.0 * PI * self.line_tension)
+        per_radius(self.line_tension)
     }
 
     /// Solves `A x = b` with the matrix found last, from the guess in `x`, to `max |A x − b| ≤ tolerance`.
@@ -388,50 +388,5 @@ impl ContactLaw {
     /// The residual looked for, as a length.
     fn allowed(&self) -> f64 {
         self.largest_overlap * relative_tolerance(self.tolerance, self.slack, self.largest_overlap)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::domain::{Domain, Vec2};
-
-    /// Where each buffer is, and how long it may get without moving.
-    fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
-        fn of<T>(v: &[T]) -> (usize, usize) {
-            (v.as_ptr() as usize, v.len())
-        }
-        [
-            of(law.set.pairs()),
-            of(law.set.forces()),
-            of(law.candidates.pairs()),
-            of(&law.violations),
-            of(law.set.inactive()),
-        ]
-    }
-
-    #[test]
-    fn a_solution_with_the_same_contacts_moves_no_buffer() {
-        let side = 6.0;
-        let mut points = Vec::new();
-        for k in 0..36 {
-            points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
-        }
-        let packing = |shift: f64| {
-            let mut points = points.clone();
-            for (k, p) in points.iter_mut().enumerate() {
-                p.x += shift * (k as f64).sqrt();
-            }
-            Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
-        };
-        let mut law = ContactLaw::default();
-        law.solve(&packing(0.0), &[], &[]).unwrap();
-        law.solve_again(&packing(1e-4)).unwrap();
-        let (before, structures) = (buffers(&law), law.work().structures);
-        for k in 2..50 {
-            law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
-        }
-        assert_eq!(law.work().structures, structures, "the same contacts");
-        assert_eq!(buffers(&law), before);
     }
 }

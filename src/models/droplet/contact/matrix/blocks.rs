@@ -3,10 +3,9 @@
 use super::entries_f32::{Operand, rounding};
 use super::{ContactMatrix, Geometry, Units};
 use crate::models::droplet::contact::list::{ContactList, DuplicateContactList};
-use crate::models::droplet::kernel::G_AT_CONTACT;
+use crate::models::droplet::kernel::{G_AT_CONTACT, per_radius};
 use crate::numerics::wide::wide;
 use crate::state::Packing;
-use core::f64::consts::PI;
 use core::ops::Range;
 
 /// Blocks of `size` contacts, one after the other in each of the columns, and where they begin.
@@ -71,7 +70,7 @@ impl ContactMatrix {
         duplicate: &DuplicateContactList,
         line_tension: f64,
     ) {
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let per_radius = per_radius(line_tension);
         let radii = packing.radii();
         self.diagonal.clear();
         self.pairs.clear();
@@ -134,13 +133,12 @@ impl ContactMatrix {
         pair: [u32; 2],
         line_tension: f64,
     ) {
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
-        let compliance = compliance(per_radius, sum);
+        let diagonal = compliance(per_radius(line_tension), sum);
         self.pairs.push(pair);
-        self.diagonal.push(compliance);
-        self.inverse_root.push(root_of_inverse(compliance));
+        self.diagonal.push(diagonal);
+        self.inverse_root.push(root_of_inverse(diagonal));
         self.operands.push(Operand::default());
         self.loads.push(0.0);
         for p in pair {

@@ -12,7 +12,7 @@
 //! **Sums without an order.** The contacts have other numbers in a run that goes on than in one that is taken up at a frame, and
 //! some of them are inactive. Inner products are therefore summed as integers: the products are rounded to a multiple of
 //! [`STEPS`]⁻¹ of the largest that there could be, and sums of integers are exact. The bits do not depend on numbers, on inactive
-//! contacts, on wide vectors or on anything but the contacts. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
+//! contacts or on wide vectors. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
 
 use crate::models::droplet::contact::matrix::ContactMatrix;
 use crate::models::droplet::contact::matrix::product::Products;

@@ -1,4 +1,5 @@
-//! Tests: a law that has gone a long way and one that is taken up at its last answer go on alike, to the last bit.
+//! What a law keeps between two solutions changes no bit: one that has gone a long way and one that is taken up at its last answer
+//! go on alike.
 
 use super::{ContactLaw, Rule};
 use crate::analysis::{Backbone, Observables};
@@ -279,4 +280,43 @@ fn law_is_not_held_to_the_particles_of_the_packing_before() {
     let more = Packing::new(domain, vec![0.5; 4], positions).unwrap();
     run.solve_again(&more).unwrap();
     assert_eq!(run.contacts().pairs, [[0, 1], [2, 3]]);
+}
+
+/// Where each buffer is, and how long it may get without moving.
+fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
+    fn of<T>(v: &[T]) -> (usize, usize) {
+        (v.as_ptr() as usize, v.len())
+    }
+    [
+        of(law.set.pairs()),
+        of(law.set.forces()),
+        of(law.candidates.pairs()),
+        of(&law.violations),
+        of(law.set.inactive()),
+    ]
+}
+
+#[test]
+fn a_solution_with_the_same_contacts_moves_no_buffer() {
+    let side = 6.0;
+    let mut points = Vec::new();
+    for k in 0..36 {
+        points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
+    }
+    let packing = |shift: f64| {
+        let mut points = points.clone();
+        for (k, p) in points.iter_mut().enumerate() {
+            p.x += shift * (k as f64).sqrt();
+        }
+        Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
+    };
+    let mut law = ContactLaw::default();
+    law.solve(&packing(0.0), &[], &[]).unwrap();
+    law.solve_again(&packing(1e-4)).unwrap();
+    let (before, structures) = (buffers(&law), law.work().structures);
+    for k in 2..50 {
+        law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
+    }
+    assert_eq!(law.work().structures, structures, "the same contacts");
+    assert_eq!(buffers(&law), before);
 }
