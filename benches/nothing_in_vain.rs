@@ -367,7 +367,7 @@ fn pictures(scene: &Scene) -> Result<Vec<Row>, Box<dyn Error>> {
                 micro(observables - same_contacts),
                 micro(observables)
             ),
-            "rattlers_are_counted_again_only_when_contacts_change",
+            "rattlers_are_counted_again_only_when_contacts_change_that_matter",
         ),
         row(
             "any recording",

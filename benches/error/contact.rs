@@ -1,7 +1,7 @@
 //! (a) The contact problem: time of one solution against its residual.
 //!
 //! Consecutive frames of a relaxation on its way (f_max below 1e-3) are solved by each method through `ContactLaw`, so that
-//! every time includes the assembly of `A` and the search for pairs that offend. *Warm* starts from the forces of the frame
+//! every time includes the assembly of `A` and the search for violating pairs. *Warm* starts from the forces of the frame
 //! before, *cold* from zero forces on the right contacts. Sparse Cholesky keeps its symbolic part while the contacts stay.
 
 use super::table::{Table, digits, median};

@@ -26,6 +26,12 @@ pub const G_AT_CONTACT: f64 = -1.5;
 /// An upper bound of `g` over all angles: its maximum is 0.640 759… at ±74.77°.
 pub const G_MAX: f64 = 0.640_76;
 
+/// `1/2πγ` (per force): with it, `g` and the radius, a force makes a length, Saitoh (3). One formula, and so one rounding.
+#[inline(always)]
+pub(super) fn per_radius(line_tension: f64) -> f64 {
+    1.0 / (2.0 * PI * line_tension)
+}
+
 /// `g(θ)` for any angle θ in radians (dimensionless).
 ///
 /// # Example

@@ -189,7 +189,7 @@ fn solve(
     largest: f64,
 ) -> bool {
     let solved = if tolerance >= FAR_ABOVE_ROUND_OFF {
-        solver.solve_to(matrix, b, x, tolerance * largest, true)
+        solver.solve_loosely(matrix, b, x, tolerance * largest)
     } else {
         solver.solve(matrix, b, x, tolerance * largest)
     };

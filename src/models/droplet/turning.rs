@@ -14,9 +14,8 @@
 
 use crate::contacts::Contacts;
 use crate::models::droplet::contact::list::{ContactList, DuplicateContactList};
-use crate::models::droplet::kernel::Direction;
+use crate::models::droplet::kernel::{Direction, per_radius};
 use crate::state::Packing;
-use core::f64::consts::PI;
 
 /// Two contacts of one particle.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +51,7 @@ impl Turning {
         self.directions
             .extend(contacts.normals.iter().map(|n| Direction::of(-n)));
         self.couples.clear();
-        let per_radius = -1.0 / (2.0 * PI * line_tension);
+        let per_radius = -per_radius(line_tension);
         for (p, radius) in packing.radii().iter().enumerate() {
             let scale = per_radius * radius;
             let (partners, numbers) = (self.duplicate.partners(p), self.duplicate.contacts(p));

@@ -103,7 +103,7 @@ fn few_exchanges_are_solved_for_in_a_local_update_and_keep_the_promise() {
             // Taken up from the frame, the residual of all contacts and all gaps is measured anew.
             let again = Relaxation::resume(&scene, run.packing().clone(), run.frame()).unwrap();
             assert!(again.law().unwrap().residual() <= run.promised_residual());
-            // What the patch claims is an upper bound, but for round-off.
+            // What the local update claims is an upper bound, but for round-off.
             assert!(again.law().unwrap().residual() <= run.law().unwrap().residual() + 1e-12);
         }
     });

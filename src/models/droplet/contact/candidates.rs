@@ -43,8 +43,8 @@ impl Candidates {
         self.neighbors.is_of(packing)
     }
 
-    /// No particle has moved by more than `distance` (length) since the last call.
-    pub(super) fn move_by(&mut self, distance: f64) {
+    /// Takes note that no particle has moved by more than `distance` (length) since the last call.
+    pub(super) fn note_motion(&mut self, distance: f64) {
         self.moved += distance;
     }
 

@@ -53,11 +53,11 @@ pub enum ContactError {
     },
     /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
     #[error(
-        "the contact set did not settle: {offending} of {} still offending after {}", counted(.contacts, "pair"), counted(.sweeps, "sweep")
+        "the contact set did not settle: {violating} of {} still break the contact law after {}", counted(.contacts, "pair"), counted(.sweeps, "sweep")
     )]
     Unsettled {
         /// Pairs that still break the law.
-        offending: usize,
+        violating: usize,
         /// Contacts in the set.
         contacts: usize,
         /// Sweeps done.

@@ -39,7 +39,7 @@ pub struct Geometry {
 /// The directions of contacts as a loop wants them: as slices, whose places are known. At N = 1024 a step takes 2 to 3 % longer
 /// where they are looked up in [`Geometry`] for each end.
 #[derive(Clone, Copy)]
-pub(crate) struct Directions<'a> {
+pub(super) struct Directions<'a> {
     pub(super) normals: &'a [Vec2],
     /// Of the opposite of the normals.
     pub(super) angles: &'a [f64],
@@ -48,7 +48,7 @@ pub(crate) struct Directions<'a> {
 impl Directions<'_> {
     /// The direction in which an end of a contact points: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
     #[inline(always)]
-    pub(crate) fn toward(self, end: u32) -> Direction {
+    pub(super) fn toward(self, end: u32) -> Direction {
         let c = (end >> 1) as usize;
         let normal = self.normals[c];
         let from_lower = Direction {
@@ -74,7 +74,7 @@ struct Scratch {
 }
 
 /// The columns of some contacts.
-pub(crate) struct Part<'a> {
+pub(super) struct Part<'a> {
     normals: &'a mut [Vec2],
     distances: &'a mut [f64],
     overlaps: &'a mut [f64],
@@ -91,21 +91,17 @@ impl Geometry {
     #[must_use]
     pub fn of(packing: &Packing, contacts: &ContactList) -> Self {
         let mut geometry = Self::default();
-        geometry.rebuild(packing, contacts);
-        geometry
-    }
-
-    pub(crate) fn rebuild(&mut self, packing: &Packing, contacts: &ContactList) {
-        self.restructure(contacts);
+        geometry.restructure(contacts);
         let pairs: Vec<_> = contacts.pairs().collect();
         wide(
             #[inline(always)]
-            || self.part(0..pairs.len()).refresh(packing, &pairs),
+            || geometry.part(0..pairs.len()).refresh(packing, &pairs),
         );
+        geometry
     }
 
     /// Takes over which particles touch; positions follow with [`Part::refresh`].
-    pub(crate) fn restructure(&mut self, contacts: &ContactList) {
+    pub(super) fn restructure(&mut self, contacts: &ContactList) {
         self.duplicate.rebuild(contacts);
         self.normals.resize(contacts.len(), Vec2::zeros());
         self.distances.resize(contacts.len(), 0.0);
@@ -114,7 +110,7 @@ impl Geometry {
     }
 
     /// Adds one more contact at the positions of `packing`, with the next number.
-    pub(crate) fn add(&mut self, packing: &Packing, pair: [u32; 2]) {
+    pub(super) fn add(&mut self, packing: &Packing, pair: [u32; 2]) {
         let [i, j] = pair.map(|p| p as usize);
         let (normal, distance) = unit_and_length(packing.separation(i, j));
         self.duplicate.add(self.normals.len() as u32, pair);
@@ -127,7 +123,7 @@ impl Geometry {
 
     /// The columns of some contacts, to be computed anew.
     #[inline(always)]
-    pub(crate) fn part(&mut self, contacts: Range<usize>) -> Part<'_> {
+    pub(super) fn part(&mut self, contacts: Range<usize>) -> Part<'_> {
         Part {
             normals: &mut self.normals[contacts.clone()],
             distances: &mut self.distances[contacts.clone()],
@@ -138,7 +134,7 @@ impl Geometry {
     }
 
     /// Those of all contacts, in two parts: the first `middle` contacts and the others.
-    pub(crate) fn halves(&mut self, middle: usize) -> [Part<'_>; 2] {
+    pub(super) fn halves(&mut self, middle: usize) -> [Part<'_>; 2] {
         let (normals, more_normals) = self.normals.split_at_mut(middle);
         let (distances, more_distances) = self.distances.split_at_mut(middle);
         let (overlaps, more_overlaps) = self.overlaps.split_at_mut(middle);
@@ -187,13 +183,13 @@ impl Geometry {
 
     /// [`Directions::toward`].
     #[inline(always)]
-    pub(crate) fn toward(&self, end: u32) -> Direction {
+    pub(super) fn toward(&self, end: u32) -> Direction {
         self.directions().toward(end)
     }
 
     /// The directions of all contacts.
     #[inline(always)]
-    pub(crate) fn directions(&self) -> Directions<'_> {
+    pub(super) fn directions(&self) -> Directions<'_> {
         Directions {
             normals: &self.normals,
             angles: &self.angles,
@@ -201,7 +197,7 @@ impl Geometry {
     }
 
     /// That of some of the contacts, `contacts`: `order` has their numbers.
-    pub(crate) fn of_some(&self, order: &[u32], contacts: &ContactList) -> Self {
+    pub(super) fn of_some(&self, order: &[u32], contacts: &ContactList) -> Self {
         let pick = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
         Self {
             normals: order.iter().map(|c| self.normals[*c as usize]).collect(),
@@ -214,7 +210,7 @@ impl Geometry {
     }
 
     /// The contacts of particle `p` with their partners and directions, in the order of the partners.
-    pub(crate) fn around(&self, p: usize) -> impl Iterator<Item = (u32, u32, Direction)> + '_ {
+    pub(super) fn around(&self, p: usize) -> impl Iterator<Item = (u32, u32, Direction)> + '_ {
         let partners = self.duplicate.partners(p).iter();
         let ends = self.duplicate.ends(p as u32, self.duplicate.entries(p));
         partners
@@ -228,7 +224,7 @@ impl Part<'_> {
     ///
     /// To be inlined into loops that are compiled for wide vectors.
     #[inline(always)]
-    pub(crate) fn refresh(self, packing: &Packing, pairs: &[[u32; 2]]) {
+    pub(super) fn refresh(self, packing: &Packing, pairs: &[[u32; 2]]) {
         let (positions, radii) = (packing.positions(), packing.radii());
         let domain = packing.domain();
         let angles = Angles::new();

@@ -155,7 +155,7 @@ impl DuplicateContactList {
     }
 
     /// Adds contact `number` between two particles: their rows move to the end, each with the new partner in its place.
-    pub(crate) fn add(&mut self, number: u32, [i, j]: [u32; 2]) {
+    pub(super) fn add(&mut self, number: u32, [i, j]: [u32; 2]) {
         for [p, q] in [[i, j], [j, i]] {
             let row = self.entries(p as usize);
             let place = self.partners(p as usize).partition_point(|k| *k < q);
@@ -171,18 +171,18 @@ impl DuplicateContactList {
     }
 
     /// The number of the contact between two particles.
-    pub(crate) fn find(&self, [i, j]: [u32; 2]) -> Option<u32> {
+    pub(super) fn find(&self, [i, j]: [u32; 2]) -> Option<u32> {
         let place = self.partners(i as usize).iter().position(|k| *k == j)?;
         Some(self.contacts(i as usize)[place])
     }
 
     /// Number of particles.
-    pub(crate) fn particles(&self) -> usize {
+    pub(super) fn particles(&self) -> usize {
         self.rows.len()
     }
 
     /// The entries of particle `i`, as a range into rows that are parallel to this list.
-    pub(crate) fn entries(&self, i: usize) -> Range<usize> {
+    pub(super) fn entries(&self, i: usize) -> Range<usize> {
         let [begin, end] = self.rows[i];
         begin as usize..end as usize
     }
@@ -190,7 +190,7 @@ impl DuplicateContactList {
     /// The ends of the contacts in the row `entries` of particle `p`: `2c` for contact `c` of which it is the lower particle,
     /// `2c + 1` of which it is the higher.
     #[inline(always)]
-    pub(crate) fn ends(&self, p: u32, entries: Range<usize>) -> impl Iterator<Item = u32> {
+    pub(super) fn ends(&self, p: u32, entries: Range<usize>) -> impl Iterator<Item = u32> {
         let partners = self.partner[entries.clone()].iter();
         let numbers = self.contact[entries].iter();
         let end = move |(q, c): (&u32, &u32)| 2 * c + u32::from(*q < p);
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_seeds_example_keeps_its_partners_in_ascending_order() {
+    fn saitohs_example_keeps_its_partners_in_ascending_order() {
         // Saitoh 2.2.2: particle i with partners 5, 2, 10, 7 is listed as {2, 5, 7, 10}.
         let mut pairs = vec![[1, 5], [1, 2], [1, 10], [1, 7], [0, 1]];
         pairs.sort_unstable();

@@ -14,10 +14,10 @@
 //! ```
 //!
 //! that is, for the minimum of `½ fᵀA f − δᵀf` over `f ≥ 0`. `A` is positive definite, so there is exactly one answer:
-//! the contact list is a function of the positions alone. [`complementarity`] finds it by exchanging contacts between
-//! the two sides; Saitoh's drop-and-add rule is one such exchange and can be had on its own.
+//! the contact list is a function of the positions alone. [`ContactLaw`] finds it by exchanging contacts between
+//! the two sides; Saitoh's drop-and-add rule is one such exchange and can be had on its own ([`Rule`]).
 //!
-//! [`ContactLaw`] is what the rest of the crate sees: positions in, contacts and forces out. A second law would be
+//! The law is what the rest of the crate sees: positions in, contacts and forces out. A second law would be
 //! added behind it.
 
 mod bulges;
@@ -34,7 +34,6 @@ pub mod solver;
 mod tolerance;
 
 pub use error::ContactError;
-pub use law::complementarity;
 pub use law::{ContactLaw, Rule, Work};
 pub(crate) use tolerance::ACCEPTED;
 pub use tolerance::due_tolerance;

@@ -1,7 +1,7 @@
 //! The search for pairs that overlap and have no force.
 //!
 //! - A pair is passed over only if the bounds of its bulges cannot bridge its distance.
-//! - A gap has the bits of [`gap_of`]; which pairs are looked at together changes none.
+//! - A gap has the bits of [`gap_of`], whichever other pairs are looked at with it.
 
 use super::bulges::Bulges;
 use super::geometry::{Geometry, gap_of};
@@ -13,8 +13,10 @@ use crate::state::Packing;
 #[derive(Clone, Copy)]
 pub(super) struct Conditions<'a> {
     pub(super) packing: &'a Packing,
+    /// γ (force).
     pub(super) line_tension: f64,
     pub(super) geometry: &'a Geometry,
+    /// By the numbers of the contacts.
     pub(super) forces: &'a [f64],
     pub(super) bulges: &'a Bulges,
     /// `1/2πγ`.

@@ -1,4 +1,5 @@
-//! The set of contacts, with their forces: the only place that says which pairs are in contact.
+//! The set of contacts, with their forces: it says which pairs are in contact. Whoever changes that (`law/exchange.rs`) tells geometry
+//! and matrix.
 //!
 //! - A contact's number is its place in `pairs` and in `forces`, which are equally long unless the forces are lent. No pair occurs twice.
 //! - The first `sorted` pairs ascend. The others came since then, in any order.
@@ -69,7 +70,7 @@ impl ContactSet {
     }
 
     /// How many contacts are active.
-    pub(super) fn active(&self) -> usize {
+    pub(super) fn active_count(&self) -> usize {
         self.pairs.len() - self.inactive.len()
     }
 
@@ -82,18 +83,15 @@ impl ContactSet {
         self.inactive.is_empty() && self.sorted == self.pairs.len()
     }
 
-    /// Takes other contacts, which ascend.
-    pub(super) fn replace(&mut self, pairs: &[[u32; 2]]) {
+    /// Takes other contacts, which ascend, and their forces.
+    pub(super) fn replace(&mut self, pairs: &[[u32; 2]], forces: &[f64]) {
+        debug_assert!(pairs.len() == forces.len() && pairs.windows(2).all(|w| w[0] < w[1]));
         self.pairs.clear();
         self.pairs.extend_from_slice(pairs);
-        self.sorted = pairs.len();
-        self.inactive.clear();
-    }
-
-    /// Takes other forces of the same contacts, all of which are active.
-    pub(super) fn replace_forces(&mut self, forces: &[f64]) {
         self.forces.clear();
         self.forces.extend_from_slice(forces);
+        self.sorted = pairs.len();
+        self.inactive.clear();
     }
 
     /// The contact leaves the set.
@@ -114,6 +112,7 @@ impl ContactSet {
 
     /// A pair that has no number gets the next one, and a force to begin with.
     pub(super) fn add(&mut self, pair: [u32; 2], force: f64) {
+        debug_assert!(!self.pairs.contains(&pair), "no pair occurs twice");
         self.pairs.push(pair);
         self.forces.push(force);
     }

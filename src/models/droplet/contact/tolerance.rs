@@ -28,18 +28,18 @@ use core::f64::consts::PI;
 /// ```
 #[must_use]
 pub fn due_tolerance(packing: &Packing, overlaps: &[f64], f_max: f64, tolerance: f64) -> f64 {
-    let scale = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-    relative_tolerance(tolerance, slack(packing, f_max), scale)
+    let largest = overlaps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+    relative_tolerance(tolerance, slack(packing, f_max), largest)
 }
 
-/// How many tolerances a residual may have: see [`ContactLaw::accepted_residual`].
+/// How many tolerances a residual may have: see [`ContactLaw::accepted_residual`](super::ContactLaw::accepted_residual).
 pub(crate) const ACCEPTED: f64 = 16.0;
 
 /// The error of a contact force that is allowed far from balance, as a part of the largest net force.
 ///
 /// Measured at N = 1024, φ = 0.86: 1e-3 takes two to three iterations more a step and as many steps; with 1e-1 FIRE takes
 /// three times the steps.
-pub(crate) const FORCE_ERROR: f64 = 1e-2;
+const FORCE_ERROR: f64 = 1e-2;
 
 /// The largest tolerance far from balance, relative to the largest `|δ|`.
 ///
@@ -47,14 +47,15 @@ pub(crate) const FORCE_ERROR: f64 = 1e-2;
 /// 100 to 250 take 6.8 iterations with 1e-4, 5.7 with this and 5.0 with 1e-3, which takes as long, as more pairs come and go. Steps
 /// to 1e-10, geometric means for 1e-4 and 1e-3: 2890 and 2973 at N = 1024, φ = 0.86 (24 seeds, which scatter by 5 %); 1343 and 1333,
 /// 1040 and 1055, 743 and 748 at N = 256, φ = 0.86, 0.90 and 1.0 (40 seeds).
-pub(crate) const LOOSEST: f64 = 3e-4;
+const LOOSEST: f64 = 3e-4;
 
 /// `FORCE_ERROR f_max (3/2π) R_min`: what changes the force of the stiffest contact by that part of `f_max` (length).
 pub(super) fn slack(packing: &Packing, f_max: f64) -> f64 {
     FORCE_ERROR * f_max * (1.5 / PI) * packing.smallest_radius()
 }
 
-pub(super) fn relative_tolerance(tolerance: f64, slack: f64, scale: f64) -> f64 {
-    let loose = if scale > 0.0 { slack / scale } else { 0.0 };
+/// The tolerance relative to the `largest` overlap (length), where a residual may be as large as `slack` (length).
+pub(super) fn relative_tolerance(tolerance: f64, slack: f64, largest: f64) -> f64 {
+    let loose = if largest > 0.0 { slack / largest } else { 0.0 };
     tolerance.max(loose.min(LOOSEST))
 }

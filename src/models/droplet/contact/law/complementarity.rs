@@ -2,9 +2,9 @@
 //!
 //! # The way to the answer
 //!
-//! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set
-//! with a negative gap ought to come. [`Rule::Complementarity`](crate::models::droplet::contact::Rule::Complementarity) exchanges them all at once and solves again, which
-//! takes one or two sweeps when the guess comes from the step before.
+//! A guess of the contact set gives forces by `A f = δ`. A contact with `f ≤ 0` ought to go; a pair outside the set with a negative
+//! gap ought to come. [`Rule::Complementarity`](super::Rule::Complementarity) exchanges them all at once and solves again, which takes
+//! one or two sweeps when the guess comes from the step before.
 //!
 //! Exchanging all at once can cycle. The safeguard is that of J. J. Júdice and F. M. Pires (Comput. Oper. Res. 21, 587
 //! (1994)): when three sweeps have not lowered the number of violating pairs below its best, only the *first* violating
@@ -14,22 +14,19 @@
 //!
 //! # Which pairs are looked at
 //!
-//! A pair that is not in the set can only have a negative gap if its bulges bridge the distance. A bulge is at most
-//! `B_i = (R_i/2πγ) (g_max Σ_{f>0} f + 3/2 Σ_{f<0} |f|)`, so pairs with `r_ij ≥ R_i + R_j + B_i + B_j` are passed over. Their
-//! gaps are positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too
-//! wide (`bulges.rs`), cannot change a bit of the answer. The forces of an unfinished exchange can be anything, and bulges as wide as
-//! many particles; they are cut short, and then all bounds are the exact sums.
+//! A pair that is not in the set can only have a negative gap if its bulges bridge the distance: pairs with `r_ij ≥ R_i + R_j +
+//! B_i + B_j` are passed over, `B_i` being a bound of a bulge ([`bulges`](crate::models::droplet::contact::bulges)). Their gaps are
+//! positive, and a positive gap changes nothing: how far the neighbour list reaches, or by how much a bound is too wide, cannot
+//! change a bit of the answer. The forces of an unfinished exchange can be anything, and bulges as wide as many particles; they are
+//! cut short, and then all bounds are the exact sums.
 //!
 //! See the example of [`ContactLaw`], through which this is used.
 
 use super::ContactLaw;
 use crate::models::droplet::contact::error::ContactError;
-use crate::models::droplet::contact::list::ContactList;
-use crate::models::droplet::contact::matrix::Precision;
-use crate::models::droplet::contact::matrix::rounding;
 use crate::models::droplet::contact::search::Conditions;
 use crate::models::droplet::contact::second_image::{Loaded, second_image};
-use crate::models::droplet::contact::solver::{LinearSolver, Progress, SolverError};
+use crate::models::droplet::contact::solver::LinearSolver;
 use crate::models::droplet::contact::tolerance::ACCEPTED;
 use crate::numerics::threads::both;
 use crate::numerics::wide::wide;
@@ -37,12 +34,6 @@ use crate::state::Packing;
 
 /// The widest bulge that candidates are looked for with, in units of the largest radius. Conditions φ = 1.3 bulges are below one.
 pub(super) const WIDEST_BULGE: f64 = 5.0;
-
-/// A tolerance, relative to the largest `|δ|`, at which round-off in a residual does not matter.
-const FAR_ABOVE_ROUND_OFF: f64 = 1e-10;
-
-/// How many times the rounding of single precision a tolerance has to be for a solution to begin with it.
-const COARSE: f64 = 5.0;
 
 /// A pair that breaks the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,8 +56,9 @@ impl ContactLaw {
     /// Exchanges contacts until no pair violates the law.
     pub(super) fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
         const PATIENCE: u32 = 3;
+        const LOCAL_UPDATES: u32 = 3;
         let most = 1000 + 20 * packing.len();
-        let (mut best, mut updates) = (usize::MAX, 3);
+        let (mut best, mut updates) = (usize::MAX, LOCAL_UPDATES);
         self.precision = self.precision_for(packing);
         let mut patience = PATIENCE;
         for _ in 0..most {
@@ -79,8 +71,7 @@ impl ContactLaw {
                 updates -= 1;
                 if self.update_locally(packing) {
                     self.assemble(packing);
-                    let (scale, worst) = (self.scale(), self.equation.max(self.tolerated));
-                    self.residual = if scale > 0.0 { worst / scale } else { worst };
+                    self.residual = self.relative(self.equation.max(self.tolerated));
                     return Ok(());
                 }
                 continue;
@@ -97,162 +88,42 @@ impl ContactLaw {
             }
         }
         Err(ContactError::Unsettled {
-            offending: self.violations.len(),
-            contacts: self.set.active(),
+            violating: self.violations.len(),
+            contacts: self.set.active_count(),
             sweeps: most,
         })
     }
 
-    /// What the first residual of a solution has to be computed in, going by the contacts found last.
-    fn precision_for(&self, packing: &Packing) -> Precision {
-        let scale = self.scale();
-        let coarse = self.slack > 0.0 && self.allowed(scale) >= COARSE * rounding(packing) * scale;
-        if coarse && matches!(self.solver, LinearSolver::ConjugateGradient(_)) {
-            Precision::Single
-        } else {
-            Precision::Double
-        }
-    }
-
     /// Whether few pairs violate the law, and the tolerance is one that a sum of residuals may be held against.
     fn is_local(&self) -> bool {
-        let scale = self.scale();
         matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            && self.allowed(scale) > FAR_ABOVE_ROUND_OFF * scale
-            && 64 * self.violations.len() <= self.set.active()
+            && self.is_far_above_round_off()
+            && 64 * self.violations.len() <= self.set.active_count()
     }
 
     /// Forces of the set, and the pairs that violate the law, in the order of the list.
     pub(super) fn sweep(&mut self, packing: &Packing) -> Result<(), ContactError> {
         self.work.sweeps += 1;
-        let multiplied = self.assemble(packing);
-        let iterations = self.find_forces(packing, multiplied)?;
-        self.work.iterations += iterations as u64;
-        match self.solver.largest_residual() {
-            Some(largest) => self.equation = largest,
-            None => self.measure_equation(),
-        }
+        self.find_forces(packing)?;
         self.inspect(packing);
         Ok(())
     }
 
-    /// Solves `A f = δ` of the set; returns the iterations. `multiplied` says that `products` are of the forces.
-    fn find_forces(&mut self, packing: &Packing, multiplied: bool) -> Result<usize, SolverError> {
-        let scale = self.scale();
-        let tolerance = self.allowed(scale);
-        let loosely = tolerance > FAR_ABOVE_ROUND_OFF * scale;
-        let direct = !matches!(self.solver, LinearSolver::ConjugateGradient(_));
-        let in_single = self.precision == Precision::Single;
-        if !multiplied && in_single {
-            let (geometry, products) = (&self.geometry, &mut self.products);
-            self.matrix
-                .assemble_f32(geometry, self.set.forces(), products);
-        } else if direct || !multiplied {
-            self.matrix.complete(&self.geometry);
-        }
-        let (overlaps, forces) = (self.geometry.overlaps(), self.set.forces_mut());
-        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            return self.solver.solve(&self.matrix, overlaps, forces, tolerance);
-        };
-        let goal = (tolerance, loosely);
-        let products = if in_single {
-            Some(self.products.single())
-        } else {
-            multiplied.then(|| self.products.double())
-        };
-        let from = (products, 0);
-        let mut progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
-        if let Progress::NeedsValues(iterations) = progress {
-            self.matrix.complete(&self.geometry);
-            let from = (None, iterations);
-            progress = solver.begin(&self.matrix, overlaps, forces, goal, from)?;
-        }
-        let iterations = match progress {
-            Progress::Done(iterations) => return Ok(iterations),
-            Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => iterations,
-        };
-        self.put_in_order(&[]);
-        self.assemble(packing);
-        self.matrix.complete(&self.geometry);
-        let LinearSolver::ConjugateGradient(solver) = &mut self.solver else {
-            return Ok(iterations);
-        };
-        let (matrix, overlaps) = (&self.matrix, self.geometry.overlaps());
-        let forces = self.set.forces_mut();
-        solver.finish(matrix, overlaps, forces, tolerance, iterations)
-    }
-
-    /// Geometry and matrix of the set at these positions; what still stands is not done again. Says whether it was
-    /// not, and `products` are those of the off-diagonal entries of `A` with the forces.
-    pub(super) fn assemble(&mut self, packing: &Packing) -> bool {
-        if !self.assembled && self.is_untidy() {
-            self.put_in_order(&[]);
-        }
-        if !self.structured {
-            let mut list = ContactList::default();
-            list.rebuild(packing.len(), self.set.pairs());
-            self.work.structures += 1;
-            self.geometry.restructure(&list);
-            let duplicate = self.geometry.duplicate();
-            self.matrix
-                .restructure(packing, &list, duplicate, self.line_tension);
-        }
-        let anew = !(self.structured && self.assembled);
-        if anew {
-            let (geometry, products) = (&mut self.geometry, &mut self.products);
-            let at = (packing, self.set.pairs(), self.set.forces());
-            self.scale = self.matrix.assemble(geometry, at, products, self.precision);
-            self.work.singles += u64::from(self.precision == Precision::Single);
-            self.work.assemblies += 1;
-            (self.structured, self.assembled) = (true, true);
-        }
-        anew
-    }
-
-    /// Whether so many contacts have left or come since the structure was built that it is time for a new one.
-    fn is_untidy(&self) -> bool {
-        16 * self.set.inactive().len() > self.set.len() + 256
-            || 64 * self.matrix.stragglers() > self.set.len() + 1024
-    }
-
-    /// Numbers the contacts in the order of pairs, without those that have left and with those that `came`; their structure
-    /// is to be built.
-    fn put_in_order(&mut self, came: &[([u32; 2], f64)]) {
-        if came.is_empty() && self.set.is_ordered() {
-            return;
-        }
-        self.set.sort(came);
-        self.candidates.forget();
-        self.bulges.forget();
-        self.structured = false;
-    }
-
-    /// The largest `|δ|`, the scale of all residuals.
-    pub(super) fn scale(&self) -> f64 {
-        self.scale
-    }
-
-    /// `max |A f − δ|` of the forces.
-    pub(super) fn measure_equation(&mut self) {
-        self.image.resize(self.set.len(), 0.0);
-        self.matrix.complete(&self.geometry);
-        self.matrix.multiply(self.set.forces(), &mut self.image);
-        self.equation = 0.0;
-        let rows = self.image.iter().zip(self.geometry.overlaps());
-        for ((q, d), s) in rows.zip(self.matrix.scaling()) {
-            if *s > 0.0 {
-                self.equation = self.equation.max((d - q).abs());
-            }
-        }
-    }
-
     /// Measures how far the forces are from the contact law, and lists the pairs that violate it.
     pub(super) fn inspect(&mut self, packing: &Packing) {
-        let scale = self.scale();
         self.bound_bulges(packing);
-        let tolerance = self.passed_over(scale);
+        let tolerance = self.passed_over();
         let worst = self.equation.max(self.find_violations(packing, tolerance));
-        self.residual = if scale > 0.0 { worst / scale } else { worst };
+        self.residual = self.relative(worst);
+    }
+
+    /// A length in units of the largest overlap.
+    fn relative(&self, length: f64) -> f64 {
+        if self.largest_overlap > 0.0 {
+            length / self.largest_overlap
+        } else {
+            length
+        }
     }
 
     /// `B_i`, and a neighbour list that covers the largest of them.
@@ -287,7 +158,7 @@ impl ContactLaw {
             self.bulges.largest() <= self.candidates.covered(),
             "pairs in reach are listed"
         );
-        let tolerance = ACCEPTED * self.allowed(self.scale());
+        let tolerance = ACCEPTED * self.allowed();
         let loaded = Loaded {
             packing,
             geometry: &self.geometry,
@@ -320,14 +191,14 @@ impl ContactLaw {
         self.violations.clear();
         self.tolerated = 0.0;
         let mut worst: f64 = 0.0;
-        let pulls = |f: f64, scaling: f64| f <= 0.0 && scaling > 0.0;
+        let pulls = |f: f64, inverse_root: f64| f <= 0.0 && inverse_root > 0.0;
         let rows = self
             .set
             .forces()
             .chunks(64)
-            .zip(self.matrix.scaling().chunks(64));
-        for (k, (forces, scaling)) in rows.enumerate() {
-            let rows = || forces.iter().zip(scaling);
+            .zip(self.matrix.inverse_root().chunks(64));
+        for (k, (forces, roots)) in rows.enumerate() {
+            let rows = || forces.iter().zip(roots);
             let any = wide(
                 #[inline(always)]
                 || rows().fold(false, |any, (f, s)| any | (pulls(*f, *s))),
@@ -373,60 +244,5 @@ impl ContactLaw {
         self.violations
             .sort_unstable_by_key(|violation| violation.pair());
         worst
-    }
-
-    /// Exchanges the first `count` violating pairs between the two sides.
-    ///
-    /// A contact that leaves becomes inactive where it is, and one that comes back becomes active; others are added behind those
-    /// that there are. Neither touches the rest of the structure.
-    pub(super) fn exchange(&mut self, packing: &Packing, count: usize) {
-        debug_assert!(
-            self.violations
-                .windows(2)
-                .all(|w| w[0].pair() < w[1].pair())
-        );
-        let mut came: Vec<([u32; 2], f64)> = Vec::new();
-        let (mut left, mut joined): (f64, f64) = (0.0, 0.0);
-        for at in 0..count {
-            let violation = self.violations[at];
-            self.note(violation.pair(), matches!(violation, Violation::Add(..)));
-            match violation {
-                Violation::Drop(contact, _) => {
-                    left = left.max(self.geometry.overlaps()[contact].abs());
-                    self.set.deactivate(contact);
-                    self.matrix.deactivate(contact);
-                }
-                Violation::Add(pair, guess) => match self.geometry.duplicate().find(pair) {
-                    Some(contact) => {
-                        joined = joined.max(self.geometry.overlaps()[contact as usize].abs());
-                        self.set.activate(contact as usize, guess);
-                        self.matrix.activate(contact as usize);
-                    }
-                    None => came.push((pair, guess)),
-                },
-            }
-        }
-        if !matches!(self.solver, LinearSolver::ConjugateGradient(_))
-            || 32 * came.len() > self.set.len()
-        {
-            self.put_in_order(&came);
-            return;
-        }
-        for &(pair, guess) in &came {
-            self.set.add(pair, guess);
-            self.geometry.add(packing, pair);
-            joined = joined.max(self.geometry.overlaps()[self.set.len() - 1].abs());
-            let duplicate = self.geometry.duplicate();
-            self.matrix.add(packing, duplicate, pair, self.line_tension);
-        }
-        if left >= self.scale {
-            let all = 0..self.matrix.len();
-            self.scale = self.matrix.largest_overlap(&self.geometry, all);
-        }
-        self.scale = self.scale.max(joined);
-        if self.set.is_ordered() {
-            self.matrix.make_whole();
-        }
-        self.candidates.remove(came.iter().map(|c| c.0));
     }
 }

@@ -15,12 +15,11 @@
 
 use super::ContactLaw;
 use super::complementarity::{Violation, WIDEST_BULGE};
-use super::local_region::{GONE, LocalRegion, NOWHERE, Whole};
+use super::local_region::{LocalRegion, Whole};
 use crate::models::droplet::contact::bulges::{WIDER, most_of};
 use crate::models::droplet::contact::geometry::gap_of;
 use crate::models::droplet::contact::matrix::compliance;
-use crate::models::droplet::kernel::Direction;
-use crate::state::{Packing, unit_and_length};
+use crate::state::Packing;
 
 /// Exchanges that are tried before the whole set is solved again.
 const ROUNDS: usize = 8;
@@ -30,46 +29,17 @@ impl ContactLaw {
     /// If not, the contacts are exchanged all the same, with forces to go on from.
     pub(super) fn update_locally(&mut self, packing: &Packing) -> bool {
         let mut region = core::mem::take(&mut self.region);
-        let known = self.set.len();
-        region.place.resize(known, NOWHERE);
-        region.left_of.resize(known, 0.0);
-        region.block.resize(packing.len(), NOWHERE);
-        region.is_visited.resize(packing.len(), false);
-        for &c in self.set.inactive() {
-            region.place[c as usize] = GONE;
-        }
-        region.forces = self.set.lend_forces();
+        region.begin(&mut self.set, packing.len());
         let settled = self.update_in(packing, &mut region);
-        self.violations.clear();
-        for &c in &region.gone {
-            self.violations
-                .push(Violation::Drop(c as usize, self.set.pairs()[c as usize]));
-        }
-        for &c in self.set.inactive() {
-            if region.place[c as usize] != GONE {
-                let (pair, force) = (self.set.pairs()[c as usize], region.forces[c as usize]);
-                self.violations.push(Violation::Add(pair, force));
-            }
-            region.place[c as usize] = NOWHERE;
-        }
-        for (k, pair) in region.added_pairs().enumerate() {
-            if region.place[known + k] != GONE {
-                let force = region.forces[known + k];
-                self.violations.push(Violation::Add(pair, force));
-            }
-        }
-        self.violations
-            .sort_unstable_by_key(|violation| violation.pair());
-        self.set.return_forces(core::mem::take(&mut region.forces));
-        region.finish();
+        region.finish(&mut self.set, &mut self.violations);
         self.region = region;
         self.exchange(packing, self.violations.len());
         settled
     }
 
     fn update_in(&mut self, packing: &Packing, region: &mut LocalRegion) -> bool {
-        let allowed = self.allowed(self.scale());
-        let (before, tolerance) = (self.equation, self.passed_over(self.scale()));
+        let allowed = self.allowed();
+        let (before, tolerance) = (self.equation, self.passed_over());
         let per_radius = self.per_radius();
         for _ in 0..ROUNDS {
             self.work.local_updates += 1;
@@ -81,7 +51,7 @@ impl ContactLaw {
                     continue;
                 };
                 region.clear();
-                let most = self.set.active() / 4;
+                let most = self.set.active_count() / 4;
                 let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
                 region.disturb(whole, contact, change);
                 let descent = region.descend(whole, 0.5 * allowed, most);
@@ -116,33 +86,16 @@ impl ContactLaw {
     ) -> Option<(usize, f64)> {
         match violation {
             Violation::Drop(contact, _) => {
-                if region.forces[contact] > 0.0 {
+                if region.forces()[contact] > 0.0 {
                     return None;
                 }
-                region.place[contact] = GONE;
-                if contact < self.set.len() && self.set.is_active(contact) {
-                    region.gone.push(contact as u32);
-                }
-                let force = core::mem::take(&mut region.forces[contact]);
-                Some((contact, -force))
+                Some((contact, -region.remove(&self.set, contact)))
             }
             Violation::Add(pair, _) => {
                 let guess = self.overlap_force(packing, region, pair, tolerance)?;
                 let per_radius = self.per_radius();
                 let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
-                let contact = if let Some(contact) = region.find(whole, pair) {
-                    region.gone.retain(|&c| c as usize != contact);
-                    region.place[contact] = NOWHERE;
-                    contact
-                } else {
-                    let [i, j] = pair.map(|p| p as usize);
-                    let (normal, _) = unit_and_length(packing.separation(i, j));
-                    region.add(pair, Direction::of(-normal));
-                    region.forces.push(0.0);
-                    region.forces.len() - 1
-                };
-                region.forces[contact] = guess;
-                Some((contact, guess))
+                Some((region.add(whole, pair, guess), guess))
             }
         }
     }
@@ -153,13 +106,13 @@ impl ContactLaw {
         let widest = WIDEST_BULGE * packing.largest_radius();
         self.violations.clear();
         let mut largest: f64 = 0.0;
-        for &p in &region.visited {
+        for &p in region.visited() {
             let mut bulge = 0.0;
             let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
             for (contact, _) in region.contacts_of(whole, p) {
-                let f = region.forces[contact];
+                let f = region.forces()[contact];
                 bulge += most_of(f);
-                if f <= 0.0 && region.place[contact] != GONE {
+                if f <= 0.0 && !region.is_gone(contact) {
                     let pair = region.pair(whole, contact);
                     self.violations.push(Violation::Drop(contact, pair));
                 }
@@ -175,13 +128,11 @@ impl ContactLaw {
             self.candidates.cover(packing, largest);
             self.candidates.list(&self.set);
         }
-        let known = self.set.len();
-        let is_near = |pair: [u32; 2]| pair.iter().any(|p| region.is_visited[*p as usize]);
         let candidates = core::mem::take(&mut self.candidates);
-        let near = candidates.pairs().iter().filter(|pair| is_near(**pair));
-        for &pair in near {
-            let came = region.find_added(pair);
-            if came.is_none_or(|k| region.place[known + k] == GONE) {
+        let pairs = candidates.pairs().iter();
+        for &pair in pairs.filter(|pair| region.is_near(**pair)) {
+            let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
+            if !region.has_come(whole, pair) {
                 self.inspect_pair(packing, region, pair, tolerance);
             }
         }
@@ -189,11 +140,11 @@ impl ContactLaw {
         for k in 0..self.set.inactive().len() {
             let c = self.set.inactive()[k];
             let pair = self.set.pairs()[c as usize];
-            if region.place[c as usize] == GONE && is_near(pair) {
+            if region.is_gone(c as usize) && region.is_near(pair) {
                 self.inspect_pair(packing, region, pair, tolerance);
             }
         }
-        for &c in &region.gone {
+        for &c in region.gone() {
             self.inspect_pair(packing, region, self.set.pairs()[c as usize], tolerance);
         }
         // A contact between two particles that were visited was met twice.
@@ -231,7 +182,7 @@ impl ContactLaw {
         let per_radius = self.per_radius();
         let whole = Whole::of(packing, &self.geometry, self.set.pairs(), per_radius);
         self.work.gaps += 1;
-        let forces = &region.forces;
+        let forces = region.forces();
         let gap = gap_of(packing, self.line_tension, [i, j], |p| {
             let contacts = region.contacts_of(whole, p as u32);
             contacts.map(|(contact, toward)| (forces[contact], toward))

@@ -1,15 +1,17 @@
 //! [`ContactLaw`]: positions in, contacts and forces out.
 //!
-//! - The [set](super::set) alone says which pairs are in contact; geometry and matrix have its numbers once it is `structured`.
-//! - Geometry and matrix are of the positions solved last once the set is `assembled`.
+//! - The [set](super::set) says which pairs are in contact. It changes in [`exchange`] alone, where geometry and matrix follow: unless
+//!   they are [outdated](Standing::Outdated) they have its numbers, and the inactive contacts of one are those of the other.
 //! - `ordered` is made from the set when it is asked for, and dropped when another solution begins.
 
-pub mod complementarity;
-#[cfg(test)]
-mod history;
+mod complementarity;
+mod exchange;
+mod forces;
 mod local_region;
 mod local_update;
 mod ordered;
+#[cfg(test)]
+mod tests;
 
 use crate::models::droplet::contact::bulges::Bulges;
 use crate::models::droplet::contact::candidates::Candidates;
@@ -20,11 +22,11 @@ use crate::models::droplet::contact::search::Search;
 use crate::models::droplet::contact::set::ContactSet;
 use crate::models::droplet::contact::solver::{LinearSolver, Method};
 use crate::models::droplet::contact::tolerance::{ACCEPTED, relative_tolerance, slack};
+use crate::models::droplet::kernel::per_radius;
 use crate::state::Packing;
 pub(super) use complementarity::Violation;
-use core::f64::consts::PI;
 use local_region::LocalRegion;
-use ordered::{Ordered, name_of};
+use ordered::Ordered;
 use std::sync::OnceLock;
 
 /// How the contact list follows the positions.
@@ -82,10 +84,7 @@ pub struct ContactLaw {
     changes: Vec<([u32; 2], bool)>,
     /// The names of the set of contacts before the last solution and now.
     sets: (u64, u64),
-    /// Whether geometry and matrix have the contacts of the set by its numbers.
-    structured: bool,
-    /// Whether geometry and matrix are of the positions at hand.
-    assembled: bool,
+    standing: Standing,
     /// The active contacts in the order of pairs, once they are asked for.
     ordered: OnceLock<Ordered>,
     candidates: Candidates,
@@ -106,11 +105,22 @@ pub struct ContactLaw {
     diverged: Option<(usize, f64)>,
     violations: Vec<Violation>,
     /// The largest `|δ|` of the contacts (length).
-    scale: f64,
+    largest_overlap: f64,
     /// The largest `|A f − δ|` (length).
     equation: f64,
     residual: f64,
     work: Work,
+}
+
+/// What geometry and matrix are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Standing {
+    /// Of other contacts than the set's, or of other numbers.
+    Outdated,
+    /// Of the set's contacts by their numbers, at other positions.
+    Structured,
+    /// Of the set's contacts by their numbers, at the positions at hand.
+    Assembled,
 }
 
 /// What solving the contact problem has cost so far: counts for benches and tests, never part of a result.
@@ -166,8 +176,7 @@ impl ContactLaw {
             set: ContactSet::default(),
             changes: Vec::new(),
             sets: (0, 0),
-            structured: false,
-            assembled: false,
+            standing: Standing::Outdated,
             ordered: OnceLock::new(),
             candidates: Candidates::default(),
             precision: Precision::Double,
@@ -180,7 +189,7 @@ impl ContactLaw {
             region: LocalRegion::default(),
             diverged: None,
             violations: Vec::new(),
-            scale: 0.0,
+            largest_overlap: 0.0,
             equation: 0.0,
             residual: 0.0,
             work: Work::default(),
@@ -200,7 +209,7 @@ impl ContactLaw {
 
     /// `1/2πγ`.
     fn per_radius(&self) -> f64 {
-        1.0 / (2.0 * PI * self.line_tension)
+        per_radius(self.line_tension)
     }
 
     /// Solves `A x = b` with the matrix found last, from the guess in `x`, to `max |A x − b| ≤ tolerance`.
@@ -225,27 +234,16 @@ impl ContactLaw {
     /// Takes contacts and forces as the answer at the positions of `packing`, without solving: for a run that goes on.
     pub(crate) fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
         self.take(packing, pairs, forces);
-        self.assembled = false;
-        self.candidates.move_by(f64::INFINITY);
+        self.moved_by(f64::INFINITY);
         self.assemble(packing);
         self.measure_equation();
         self.inspect(packing);
     }
 
-    fn take(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.ordered.take();
-        let known = self.set.is_ordered() && self.set.pairs() == pairs;
-        if !known || !self.candidates.is_of(packing) {
-            self.set.replace(pairs);
-            self.candidates.forget();
-            self.bulges.forget();
-            self.structured = false;
-            let set = name_of(pairs);
-            self.sets = (set, set);
-        }
-        self.changes.clear();
-        self.sets.0 = self.sets.1;
-        self.set.replace_forces(forces);
+    /// The particles are elsewhere, none of them by more than `distance` (length).
+    fn moved_by(&mut self, distance: f64) {
+        self.standing = self.standing.min(Standing::Structured);
+        self.candidates.note_motion(distance);
     }
 
     /// How far the last answer is from the contact law, relative to the largest `|δ|` among the contacts: the largest
@@ -333,8 +331,7 @@ impl ContactLaw {
         self.ordered.take();
         self.changes.clear();
         self.sets.0 = self.sets.1;
-        self.assembled = false;
-        self.candidates.move_by(moved);
+        self.moved_by(moved);
         self.slack = slack(packing, f_max);
         self.work.solves += 1;
         match self.rule {
@@ -363,8 +360,7 @@ impl ContactLaw {
 
     /// The forces of an unfinished exchange can be anything; only an answer is held against the box.
     fn check_answer(&self, packing: &Packing) -> Result<(), ContactError> {
-        let scale = self.scale();
-        if self.residual * scale <= ACCEPTED * self.allowed(scale) {
+        if self.residual * self.largest_overlap <= ACCEPTED * self.allowed() {
             self.check_images(packing)?;
         }
         Ok(())
@@ -376,7 +372,7 @@ impl ContactLaw {
     pub fn tolerance_at(&self, packing: &Packing, f_max: f64) -> f64 {
         match self.rule {
             Rule::Complementarity => {
-                relative_tolerance(self.tolerance, slack(packing, f_max), self.scale())
+                relative_tolerance(self.tolerance, slack(packing, f_max), self.largest_overlap)
             }
             Rule::Saitoh => self.tolerance,
         }
@@ -384,58 +380,13 @@ impl ContactLaw {
 
     /// How far contours of a pair without a force may overlap (length). Where the tolerance follows `f_max` it is half of what is
     /// accepted, so that `f_max` may fall by half in a step before such a pair breaks its promise.
-    fn passed_over(&self, scale: f64) -> f64 {
+    fn passed_over(&self) -> f64 {
         let part = if self.slack > 0.0 { 0.5 } else { 1.0 };
-        part * ACCEPTED * self.allowed(scale)
+        part * ACCEPTED * self.allowed()
     }
 
-    /// The residual looked for, as a length; `scale` is the largest `|δ|`.
-    fn allowed(&self, scale: f64) -> f64 {
-        scale * relative_tolerance(self.tolerance, self.slack, scale)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::domain::{Domain, Vec2};
-
-    /// Where each buffer is, and how long it may get without moving.
-    fn buffers(law: &ContactLaw) -> [(usize, usize); 5] {
-        fn of<T>(v: &[T]) -> (usize, usize) {
-            (v.as_ptr() as usize, v.len())
-        }
-        [
-            of(law.set.pairs()),
-            of(law.set.forces()),
-            of(law.candidates.pairs()),
-            of(&law.violations),
-            of(law.set.inactive()),
-        ]
-    }
-
-    #[test]
-    fn a_solution_with_the_same_contacts_moves_no_buffer() {
-        let side = 6.0;
-        let mut points = Vec::new();
-        for k in 0..36 {
-            points.push(Vec2::new(0.5 + f64::from(k % 6), 0.5 + f64::from(k / 6)));
-        }
-        let packing = |shift: f64| {
-            let mut points = points.clone();
-            for (k, p) in points.iter_mut().enumerate() {
-                p.x += shift * (k as f64).sqrt();
-            }
-            Packing::new(Domain::new(side, side).unwrap(), vec![0.52; 36], points).unwrap()
-        };
-        let mut law = ContactLaw::default();
-        law.solve(&packing(0.0), &[], &[]).unwrap();
-        law.solve_again(&packing(1e-4)).unwrap();
-        let (before, structures) = (buffers(&law), law.work().structures);
-        for k in 2..50 {
-            law.solve_again(&packing(1e-4 * f64::from(k))).unwrap();
-        }
-        assert_eq!(law.work().structures, structures, "the same contacts");
-        assert_eq!(buffers(&law), before);
+    /// The residual looked for, as a length.
+    fn allowed(&self) -> f64 {
+        self.largest_overlap * relative_tolerance(self.tolerance, self.slack, self.largest_overlap)
     }
 }

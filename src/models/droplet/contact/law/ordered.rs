@@ -25,8 +25,8 @@ impl ContactLaw {
     pub(crate) fn copy_contacts(&self, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
         pairs.clear();
         forces.clear();
-        pairs.reserve(self.set.active());
-        forces.reserve(self.set.active());
+        pairs.reserve(self.set.active_count());
+        forces.reserve(self.set.active_count());
         for stretch in self.set.in_order() {
             pairs.extend_from_slice(&self.set.pairs()[stretch.clone()]);
             forces.extend_from_slice(&self.set.forces()[stretch]);
@@ -83,15 +83,9 @@ impl ContactLaw {
         self.sets
     }
 
-    /// Takes note of a contact that comes or goes.
-    pub(super) fn note(&mut self, pair: [u32; 2], came: bool) {
-        self.changes.push((pair, came));
-        self.sets.1 ^= name(pair);
-    }
-
     /// Number of contacts.
     pub(crate) fn contact_count(&self) -> usize {
-        self.set.active()
+        self.set.active_count()
     }
 
     pub(super) fn ordered(&self) -> &Ordered {
@@ -135,18 +129,4 @@ impl Ordered {
             whole.of_some(&self.order, &list, &geometry)
         })
     }
-}
-
-/// The name of a set of contacts; see [`ContactLaw::sets`].
-pub(super) fn name_of(pairs: &[[u32; 2]]) -> u64 {
-    pairs.iter().fold(0, |set, pair| set ^ name(*pair))
-}
-
-/// A pair's part in the name of a set of contacts: the finalizer of SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA
-/// 2014).
-fn name([i, j]: [u32; 2]) -> u64 {
-    let mut x = (u64::from(i) << 32 | u64::from(j)).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
 }

@@ -26,8 +26,8 @@ struct Layout<'a> {
     runs: &'a [Run],
     particle: &'a [u32],
     end: &'a [u32],
-    scale: &'a [f64],
-    scaling: &'a [f64],
+    factor: &'a [f64],
+    inverse_root: &'a [f64],
     operands: &'a [Operand],
     loads: &'a [f32],
     units: Units,
@@ -37,7 +37,7 @@ struct Layout<'a> {
 struct Filled<'a> {
     first: usize,
     value: &'a mut [f64],
-    scaled: &'a mut [f32],
+    entries_f32: &'a mut [f32],
     scratch: &'a mut Scratch,
 }
 
@@ -48,7 +48,7 @@ enum Column<'a> {
 }
 
 impl ContactMatrix {
-    /// Directions and scaled values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
+    /// Directions and values at the positions of `packing`, and what the off-diagonal entries make of `forces`, as
     /// [`products_into`](Self::products_into) has it; entries and products in this `precision`. The pairs are the contacts by number,
     /// those of `geometry`. Returns the largest `|δ|` (length).
     pub(crate) fn assemble(
@@ -103,7 +103,7 @@ impl ContactMatrix {
         self.lacks_values = true;
     }
 
-    /// Values and scaled values of the directions of `geometry`, where they are not there.
+    /// Values of the directions of `geometry`, where they are not there.
     pub(crate) fn complete(&mut self, geometry: &Geometry) {
         if self.is_complete() {
             return;
@@ -181,7 +181,7 @@ impl ContactMatrix {
                 }
                 let all = self.runs.len();
                 let at = (geometry.directions(), forces);
-                self.fill(at, self.sorted..all, &mut column);
+                self.fill(at, self.sorted_runs..all, &mut column);
                 largest
             },
         );
@@ -196,13 +196,13 @@ impl ContactMatrix {
             operands: &mut self.operands[contacts.clone()],
             loads: &mut self.loads[contacts.clone()],
         };
-        let of = [&self.diagonal[..], &self.scaling, forces];
+        let of = [&self.diagonal[..], &self.inverse_root, forces];
         operands.compute(geometry.directions(), of, contacts, self.units);
     }
 
     /// [`compute_operands`](Self::compute_operands) at all contacts, the first `half` of them and the others.
     fn compute_operands_by_two(&mut self, geometry: &Geometry, forces: &[f64], half: usize) {
-        let (of, units) = ([&self.diagonal[..], &self.scaling, forces], self.units);
+        let (of, units) = ([&self.diagonal[..], &self.inverse_root, forces], self.units);
         let (operands, more_operands) = self.operands.split_at_mut(half);
         let (loads, more_loads) = self.loads.split_at_mut(half);
         let compute = |operands: Operands<'_>, contacts: Range<usize>| {
@@ -264,43 +264,43 @@ impl ContactMatrix {
 
     /// The run with which the second half of the entries begins.
     fn middle(&self) -> usize {
-        let half = self.scaled.len() / 2;
-        self.runs.partition_point(|run| run.value < half)
+        let half = self.entries_f32.len() / 2;
+        self.runs.partition_point(|run| run.values().start < half)
     }
 
     /// What the blocks are made from, and where they go: those of the first `middle` runs, and the others.
     fn halves(&mut self, middle: usize) -> (Layout<'_>, [Filled<'_>; 2]) {
-        let all = self.scaled.len();
-        let first = self.runs.get(middle).map_or(all, |run| run.value);
+        let all = self.entries_f32.len();
+        let first = self.runs.get(middle).map_or(all, |run| run.values().start);
         let layout = Layout {
             runs: &self.runs,
             particle: &self.particle,
             end: &self.end,
-            scale: &self.scale,
-            scaling: &self.scaling,
+            factor: &self.factor,
+            inverse_root: &self.inverse_root,
             operands: &self.operands,
             loads: &self.loads,
             units: self.units,
         };
-        let (scaled, more_scaled) = self.scaled.split_at_mut(first);
+        let (entries_f32, more_entries) = self.entries_f32.split_at_mut(first);
         let (value, more_values) = self.value.split_at_mut(first);
         let [scratch, more_scratch] = &mut self.scratch;
         let one = Filled {
             first: 0,
             value,
-            scaled,
+            entries_f32,
             scratch,
         };
         let other = Filled {
             first,
             value: more_values,
-            scaled: more_scaled,
+            entries_f32: more_entries,
             scratch: more_scratch,
         };
         (layout, [one, other])
     }
 
-    /// The values of some runs, scaled and not, and their products with the forces.
+    /// The values of some runs, in both precisions, and their products with the forces.
     #[inline(always)]
     fn fill(&mut self, at: (Directions<'_>, &[f64]), runs: Range<usize>, column: &mut Column<'_>) {
         let all = self.runs.len();
@@ -314,7 +314,7 @@ impl ContactMatrix {
         let larger = |m: f64, x: f64| if x > m { x } else { m };
         let in_contact = |d: f64, s: f64| if s > 0.0 { d.abs() } else { 0.0 };
         let (d8, d_rest) = geometry.overlaps()[contacts.clone()].as_chunks::<8>();
-        let (s8, s_rest) = self.scaling[contacts].as_chunks::<8>();
+        let (s8, s_rest) = self.inverse_root[contacts].as_chunks::<8>();
         let mut largest = [0.0; 8];
         for (d, s) in d8.iter().zip(s8) {
             for k in 0..8 {
@@ -333,7 +333,7 @@ struct Operands<'a> {
 }
 
 impl Operands<'_> {
-    /// From the directions of the `contacts`, and the columns of diagonal, scaling and forces of all.
+    /// From the directions of the `contacts`, and the columns of diagonal, inverse root and forces of all.
     #[inline(always)]
     fn compute(
         self,
@@ -342,17 +342,17 @@ impl Operands<'_> {
         contacts: Range<usize>,
         units: Units,
     ) {
-        let [diagonal, scaling, forces] = of.map(
+        let [diagonal, roots, forces] = of.map(
             #[inline(always)]
             |column| &column[contacts.clone()],
         );
         let inverse = 1.0 / units.load;
         let columns = self.loads.iter_mut().zip(diagonal);
-        for ((load, a), (s, f)) in columns.zip(scaling.iter().zip(forces)) {
+        for ((load, a), (s, f)) in columns.zip(roots.iter().zip(forces)) {
             *load = (f * (a * s * inverse)) as f32;
         }
         let directions = normals[contacts.clone()].iter().zip(&angles[contacts]);
-        for ((operand, s), (n, angle)) in self.operands.iter_mut().zip(scaling).zip(directions) {
+        for ((operand, s), (n, angle)) in self.operands.iter_mut().zip(roots).zip(directions) {
             *operand = Operand::of((-n.x, -n.y), *angle, s * units.root);
         }
     }
@@ -397,22 +397,22 @@ impl Layout<'_> {
                 toward,
                 ends,
                 values: &mut out.value[own.clone()],
-                scaled: &mut out.scaled[own],
-                scaling: self.scaling,
+                entries_f32: &mut out.entries_f32[own],
+                inverse_root: self.inverse_root,
                 forces,
                 products,
             };
-            let particles = &self.particle[run.block..run.block + run.count];
-            let scales = particles.iter().map(|p| self.scale[*p as usize]);
+            let particles = &self.particle[run.blocks()];
+            let factors = particles.iter().map(|p| self.factor[*p as usize]);
             match run.size {
                 1 => {}
-                2 => fill::<2, 1>(blocks, scales),
-                3 => fill::<3, 3>(blocks, scales),
-                4 => fill::<4, 6>(blocks, scales),
-                5 => fill::<5, 10>(blocks, scales),
-                6 => fill::<6, 15>(blocks, scales),
-                7 => fill::<7, 21>(blocks, scales),
-                z => fill_blocks(z, blocks, scales),
+                2 => fill::<2, 1>(blocks, factors),
+                3 => fill::<3, 3>(blocks, factors),
+                4 => fill::<4, 6>(blocks, factors),
+                5 => fill::<5, 10>(blocks, factors),
+                6 => fill::<6, 15>(blocks, factors),
+                7 => fill::<7, 21>(blocks, factors),
+                z => fill_blocks(z, blocks, factors),
             }
         }
     }
@@ -426,14 +426,14 @@ impl Layout<'_> {
                 ends: &self.end[run.ends()],
                 operands: self.operands,
                 loads: self.loads,
-                scaled: &mut out.scaled[own],
+                entries_f32: &mut out.entries_f32[own],
                 products,
                 scratch: &mut out.scratch.lanes,
             };
-            let particles = &self.particle[run.block..run.block + run.count];
+            let particles = &self.particle[run.blocks()];
             let radii = particles
                 .iter()
-                .map(|p| (self.scale[*p as usize] * per_radius) as f32);
+                .map(|p| (self.factor[*p as usize] * per_radius) as f32);
             match run.size {
                 1 => {}
                 2 => fill_f32::<2, 1>(blocks, radii),

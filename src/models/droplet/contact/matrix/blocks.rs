@@ -3,20 +3,19 @@
 use super::entries_f32::{Operand, rounding};
 use super::{ContactMatrix, Geometry, Units};
 use crate::models::droplet::contact::list::{ContactList, DuplicateContactList};
-use crate::models::droplet::kernel::G_AT_CONTACT;
+use crate::models::droplet::kernel::{G_AT_CONTACT, per_radius};
 use crate::numerics::wide::wide;
 use crate::state::Packing;
-use core::f64::consts::PI;
 use core::ops::Range;
 
 /// Blocks of `size` contacts, one after the other in each of the columns, and where they begin.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Run {
     pub(super) size: usize,
-    pub(super) count: usize,
-    pub(super) block: usize,
-    pub(super) end: usize,
-    pub(super) value: usize,
+    count: usize,
+    block: usize,
+    end: usize,
+    value: usize,
 }
 
 impl Run {
@@ -26,6 +25,10 @@ impl Run {
             count,
             ..Self::default()
         }
+    }
+
+    pub(super) fn blocks(&self) -> Range<usize> {
+        self.block..self.block + self.count
     }
 
     pub(super) fn ends(&self) -> Range<usize> {
@@ -67,7 +70,7 @@ impl ContactMatrix {
         duplicate: &DuplicateContactList,
         line_tension: f64,
     ) {
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
+        let per_radius = per_radius(line_tension);
         let radii = packing.radii();
         self.diagonal.clear();
         self.pairs.clear();
@@ -83,15 +86,15 @@ impl ContactMatrix {
             load: root * line_tension,
             rounding: rounding(packing),
         };
-        self.scaling.resize(contacts.len(), 0.0);
-        self.scale.clear();
-        let scale = |r: &f64| -r * per_radius;
-        self.scale.extend(radii.iter().map(scale));
+        self.inverse_root.resize(contacts.len(), 0.0);
+        self.factor.clear();
+        let factor = |r: &f64| -r * per_radius;
+        self.factor.extend(radii.iter().map(factor));
         wide(
             #[inline(always)]
             || {
-                for (scaling, compliance) in self.scaling.iter_mut().zip(&self.diagonal) {
-                    *scaling = root_of_inverse(*compliance);
+                for (root, compliance) in self.inverse_root.iter_mut().zip(&self.diagonal) {
+                    *root = root_of_inverse(*compliance);
                 }
             },
         );
@@ -100,7 +103,7 @@ impl ContactMatrix {
 
     /// Places for the blocks.
     fn lay_out(&mut self, duplicate: &DuplicateContactList) {
-        (self.changed, self.lacks_values) = (false, true);
+        self.lacks_values = true;
         self.sort_blocks(duplicate);
         self.block_of.clear();
         self.block_of.resize(duplicate.particles(), NO_BLOCK);
@@ -117,7 +120,7 @@ impl ContactMatrix {
             (end, value) = (run.ends().end, run.values().end);
         }
         self.value.resize(value, 0.0);
-        self.scaled.resize(value, 0.0);
+        self.entries_f32.resize(value, 0.0);
         self.operands.resize(self.pairs.len(), Operand::default());
         self.loads.resize(self.pairs.len(), 0.0);
     }
@@ -130,14 +133,12 @@ impl ContactMatrix {
         pair: [u32; 2],
         line_tension: f64,
     ) {
-        self.changed = true;
-        let per_radius = 1.0 / (2.0 * PI * line_tension);
         let radii = packing.radii();
         let sum = radii[pair[0] as usize] + radii[pair[1] as usize];
-        let compliance = compliance(per_radius, sum);
+        let diagonal = compliance(per_radius(line_tension), sum);
         self.pairs.push(pair);
-        self.diagonal.push(compliance);
-        self.scaling.push(root_of_inverse(compliance));
+        self.diagonal.push(diagonal);
+        self.inverse_root.push(root_of_inverse(diagonal));
         self.operands.push(Operand::default());
         self.loads.push(0.0);
         for p in pair {
@@ -154,7 +155,7 @@ impl ContactMatrix {
             let row = duplicate.entries(p as usize);
             self.end.extend(duplicate.ends(p, row));
             self.value.resize(run.values().end, 0.0);
-            self.scaled.resize(run.values().end, 0.0);
+            self.entries_f32.resize(run.values().end, 0.0);
             self.runs.push(run);
         }
         self.lacks_values = true;
@@ -186,21 +187,16 @@ impl ContactMatrix {
         self.end.copy_within(ends..ends + z, run.end + z * to);
     }
 
-    /// All contacts are active and none was added: the contacts are those that the structure was built of.
-    pub(crate) fn make_whole(&mut self) {
-        self.changed = false;
-    }
-
     /// Corrections leave the force of contact `c`, which takes no part in them.
     pub(crate) fn deactivate(&mut self, c: usize) {
-        (self.changed, self.lacks_values) = (true, true);
-        self.scaling[c] = 0.0;
+        self.lacks_values = true;
+        self.inverse_root[c] = 0.0;
     }
 
     /// Corrections reach contact `c` again.
     pub(crate) fn activate(&mut self, c: usize) {
-        (self.changed, self.lacks_values) = (true, true);
-        self.scaling[c] = root_of_inverse(self.diagonal[c]);
+        self.lacks_values = true;
+        self.inverse_root[c] = root_of_inverse(self.diagonal[c]);
     }
 
     /// The order of the blocks: within each stretch of particles by size, then by particle.
@@ -230,13 +226,13 @@ impl ContactMatrix {
                 self.particle[*slot] = p as u32;
                 *slot += 1;
             }
-            let behind = stretch.end as u32;
+            let after = stretch.end as u32;
             let large = stretch.map(size).filter(|&z| z > LARGEST_SORTED);
             self.runs.extend(large.map(|z| Run::of(z, 1)));
-            let contacts = self.pairs.partition_point(|pair| pair[0] < behind);
+            let contacts = self.pairs.partition_point(|pair| pair[0] < after);
             self.stretches.push([self.runs.len(), contacts]);
         }
-        self.sorted = self.runs.len();
+        self.sorted_runs = self.runs.len();
     }
 
     /// The matrix of those contacts alone that are active: `order` has their numbers, `contacts` them in this order, and
@@ -250,8 +246,8 @@ impl ContactMatrix {
         let of_these = |column: &[f64]| order.iter().map(|c| column[*c as usize]).collect();
         let mut some = Self {
             diagonal: of_these(&self.diagonal),
-            scaling: of_these(&self.scaling),
-            scale: self.scale.clone(),
+            inverse_root: of_these(&self.inverse_root),
+            factor: self.factor.clone(),
             pairs: contacts.pairs().collect(),
             largest_root: self.largest_root,
             units: self.units,

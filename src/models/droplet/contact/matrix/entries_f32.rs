@@ -2,7 +2,7 @@
 //!
 //! Far from balance the forces of a step are solved for to a few digits, and entries in double precision would only be rounded.
 //! What an entry takes of a contact goes into sixteen bytes: its direction seen from the lower particle, its angle in parts of the whole
-//! turn, and the scaling. Angles that wrap need no branch, differ exactly, and the direction seen from the other
+//! turn, and the inverse root. Angles that wrap need no branch, differ exactly, and the direction seen from the other
 //! particle is the same number with three bits turned over.
 
 use super::product::product_of_blocks;
@@ -28,7 +28,7 @@ const SEEN_FROM: [[u32; 4]; 2] = [[0; 4], [TOP, TOP, TOP, 0]];
 
 impl Operand {
     /// Of a contact whose direction, from the lower particle to the higher, has the components `(x, y)` and this `angle` (radians,
-    /// −π to π), and whose scaling is `weight`.
+    /// −π to π), and whose inverse root is `weight`.
     #[inline(always)]
     pub(super) fn of((x, y): (f64, f64), angle: f64, weight: f64) -> Self {
         Self([
@@ -101,7 +101,7 @@ pub(super) struct BlocksF32<'a> {
     /// Of all contacts: how they are seen from their lower particles, and `A_cc^½ f_c`.
     pub(super) operands: &'a [Operand],
     pub(super) loads: &'a [f32],
-    pub(super) scaled: &'a mut [f32],
+    pub(super) entries_f32: &'a mut [f32],
     /// What the entries make of the loads is added to these.
     pub(super) products: &'a mut [f32],
     /// Room for the blocks.
@@ -118,7 +118,7 @@ pub(super) fn fill_f32<const Z: usize, const T: usize>(
         ends,
         operands,
         loads,
-        scaled,
+        entries_f32,
         products,
         scratch,
     } = blocks;
@@ -127,7 +127,7 @@ pub(super) fn fill_f32<const Z: usize, const T: usize>(
         scratch.resize(groups * Z, Lanes::default());
     }
     let scratch = scratch.as_chunks_mut::<Z>().0;
-    let (ends, scaled) = (ends.as_chunks::<Z>().0, scaled.as_chunks_mut::<T>().0);
+    let (ends, entries_f32) = (ends.as_chunks::<Z>().0, entries_f32.as_chunks_mut::<T>().0);
     let loads = &loads[..operands.len()];
     for (ends, scratch) in ends.chunks(LANES).zip(&mut *scratch) {
         for (lane, ends) in ends.iter().enumerate() {
@@ -138,9 +138,9 @@ pub(super) fn fill_f32<const Z: usize, const T: usize>(
         }
     }
     let groups = ends.chunks(LANES).zip(&*scratch);
-    for (scaled, (ends, lanes)) in scaled.chunks_mut(LANES).zip(groups) {
+    for (column, (ends, lanes)) in entries_f32.chunks_mut(LANES).zip(groups) {
         let mut radius = [0.0; LANES];
-        for (own, radius) in radius.iter_mut().zip(radii.by_ref().take(scaled.len())) {
+        for (own, radius) in radius.iter_mut().zip(radii.by_ref().take(column.len())) {
             *own = radius;
         }
         let (mut all, mut sums) = ([[0.0; LANES]; T], [[0.0; LANES]; Z]);
@@ -154,9 +154,9 @@ pub(super) fn fill_f32<const Z: usize, const T: usize>(
                 all[b * (b - 1) / 2 + a] = entries;
             }
         }
-        for (lane, (scaled, ends)) in scaled.iter_mut().zip(ends).enumerate() {
+        for (lane, (own, ends)) in column.iter_mut().zip(ends).enumerate() {
             for k in 0..T {
-                scaled[k] = all[k][lane % LANES];
+                own[k] = all[k][lane % LANES];
             }
             for k in 0..Z {
                 products[(ends[k] >> 1) as usize] += sums[k][lane % LANES];
@@ -176,25 +176,25 @@ pub(super) fn fill_f32_blocks(
         ends,
         operands,
         loads,
-        scaled,
+        entries_f32,
         products,
         scratch,
     } = blocks;
     if scratch.len() < size {
         scratch.resize(size, Lanes::default());
     }
-    let scaled = scaled.chunks_exact_mut(size * (size - 1) / 2);
-    for ((ends, radius), scaled) in ends.chunks_exact(size).zip(radii).zip(scaled) {
+    let blocks = entries_f32.chunks_exact_mut(size * (size - 1) / 2);
+    for ((ends, radius), own) in ends.chunks_exact(size).zip(radii).zip(blocks) {
         for (scratch, end) in scratch.iter_mut().zip(ends) {
             scratch.set(0, operands[(end >> 1) as usize].from(*end), 0.0);
         }
-        let mut column = scaled.iter_mut();
+        let mut column = own.iter_mut();
         for b in 1..size {
-            for (a, scaled) in (0..b).zip(&mut column) {
-                *scaled = entries(&scratch[a], &scratch[b], &[radius; LANES])[0];
+            for (a, entry) in (0..b).zip(&mut column) {
+                *entry = entries(&scratch[a], &scratch[b], &[radius; LANES])[0];
             }
         }
-        product_of_blocks(size, ends, scaled, loads, products);
+        product_of_blocks(size, ends, own, loads, products);
     }
 }
 
@@ -218,15 +218,15 @@ mod tests {
         let mut matrix = ContactMatrix::of(packing, &list, &geometry, gamma);
         let mut image = vec![0.0; forces.len()];
         matrix.multiply(forces, &mut image);
-        let rounded = matrix.scaled().to_vec();
+        let rounded = matrix.entries_f32().to_vec();
         let mut products = FirstProducts::default();
         matrix.assemble_f32(&geometry, forces, &mut products);
-        let entries = rounded.iter().zip(matrix.scaled());
+        let entries = rounded.iter().zip(matrix.entries_f32());
         let entries = entries.map(|(a, b)| f64::from((a - b).abs()));
         let (mut off, mut load) = (0.0f64, 0.0f64);
         for (c, f) in forces.iter().enumerate() {
             let a = matrix.diagonal()[c];
-            let root = a * matrix.scaling()[c];
+            let root = a * matrix.inverse_root()[c];
             let q = f64::from(products.single.sums()[c]) * matrix.unit_of_loads() * root;
             off = off.max((image[c] - a * f - q).abs());
             load = load.max((a * f).abs());

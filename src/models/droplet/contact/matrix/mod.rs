@@ -1,9 +1,9 @@
 //! The matrix `A` that couples the forces of a set of contacts, Saitoh (4)–(6).
 //!
-//! - Rows are the numbers of the contacts. An inactive contact has a row, whose scaling is 0.
+//! - Rows are the numbers of the contacts. An inactive contact has a row, whose inverse root is 0.
 //! - A particle with contacts has one block; a block names its contacts in the order of the particle's partners.
-//! - The first `sorted` runs hold whole stretches of particles. A block that a contact was added to stands behind them, alone.
-//! - Behind an assembly `scaled` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
+//! - The first `sorted_runs` hold whole stretches of particles. A block that a contact was added to stands after them, alone.
+//! - After an assembly `entries_f32` is of the positions and contacts at hand; so is `value`, unless it `lacks_values`.
 //!
 //! See the example of [`ContactMatrix`].
 
@@ -65,23 +65,23 @@ pub struct ContactMatrix {
     /// `A_cc` (length per force).
     diagonal: Vec<f64>,
     /// `A_cc^(−½)`, and 0 for an inactive contact.
-    scaling: Vec<f64>,
+    inverse_root: Vec<f64>,
     /// A bound of `A_cc^½`.
     largest_root: f64,
     /// Runs of blocks of one size.
     runs: Vec<Run>,
     /// How many of the runs were sorted when the structure was built.
-    sorted: usize,
+    sorted_runs: usize,
     /// The particle of each block.
     particle: Vec<u32>,
     /// The ends of contacts in the blocks: `2c` for the lower particle of contact `c`, `2c + 1` for the higher.
     end: Vec<u32>,
-    /// `−R_p/2πγ` of each particle.
-    scale: Vec<f64>,
+    /// `−R_p/2πγ` of each particle: what `g` is multiplied with.
+    factor: Vec<f64>,
     /// The entries of the blocks: those between the block's contacts `b` and `a < b`, by `b` and then by `a`.
     value: Vec<f64>,
     /// `value` of `D^(−½) A D^(−½)` with `D = diag A`, in single precision: no unit, none above 1. 0 for inactive contacts.
-    scaled: Vec<f32>,
+    entries_f32: Vec<f32>,
     /// What entries in single precision are computed from, see [`entries_f32`].
     operands: Vec<Operand>,
     /// `A_cc^½ f_c`, in units of `units.load`: what entries in single precision are multiplied with first.
@@ -94,12 +94,10 @@ pub struct ContactMatrix {
     scratch: [Scratch; 2],
     /// Where the runs and the contacts end whose (lower) particles are in a stretch.
     stretches: Vec<[usize; 2]>,
-    /// The block of each particle, [`NO_BLOCK`] where it has no contact.
+    /// The block of each particle, [`NO_BLOCK`](blocks::NO_BLOCK) where it has no contact.
     block_of: Vec<u32>,
     /// The particles of each contact.
     pairs: Vec<[u32; 2]>,
-    /// Whether a contact was added or is inactive.
-    changed: bool,
 }
 
 /// What entries are computed in.
@@ -131,49 +129,44 @@ impl ContactMatrix {
         line_tension: f64,
     ) -> Self {
         let mut matrix = Self::default();
-        matrix.rebuild(packing, contacts, geometry, line_tension);
+        matrix.restructure(packing, contacts, geometry.duplicate(), line_tension);
+        matrix.complete(geometry);
         matrix
     }
 
-    pub(crate) fn rebuild(
-        &mut self,
-        packing: &Packing,
-        contacts: &ContactList,
-        geometry: &Geometry,
-        line_tension: f64,
-    ) {
-        self.restructure(packing, contacts, geometry.duplicate(), line_tension);
-        self.complete(geometry);
-    }
-
     /// The unit of the products of [`Self::loads`] (length times force, to the half).
-    pub(crate) fn unit_of_loads(&self) -> f64 {
+    pub(super) fn unit_of_loads(&self) -> f64 {
         self.units.load
     }
 
     /// What their rounding may come to, as a part of the largest `|A_cc f|`.
-    pub(crate) fn rounding_of_loads(&self) -> f64 {
+    pub(super) fn rounding_of_loads(&self) -> f64 {
         self.units.rounding
     }
 
-    /// Whether the contacts are those that the structure was built of, in their order.
-    pub(crate) fn is_whole(&self) -> bool {
-        !self.changed
+    /// Whether the contacts are those that the structure was built of, in their order, and all active.
+    pub(super) fn is_whole(&self) -> bool {
+        self.stragglers() == 0 && self.inverse_root.iter().all(|s| *s > 0.0)
     }
 
     /// The contacts that the structure was built of come first, this many, in the order of pairs.
-    pub(crate) fn sorted_contacts(&self) -> usize {
+    fn sorted_contacts(&self) -> usize {
         self.stretches.last().map_or(0, |stretch| stretch[1])
     }
 
     /// Number of particles.
-    pub(crate) fn particles(&self) -> usize {
+    pub(super) fn particles(&self) -> usize {
         self.block_of.len()
     }
 
     /// How many blocks stand alone because contacts were added.
-    pub(crate) fn stragglers(&self) -> usize {
-        self.runs.len() - self.sorted
+    pub(super) fn stragglers(&self) -> usize {
+        self.runs.len() - self.sorted_runs
+    }
+
+    /// The particles of each contact.
+    pub(super) fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs
     }
 
     /// Number of rows, the number of contacts.
@@ -195,12 +188,12 @@ impl ContactMatrix {
     }
 
     /// `A_cc^(−½)`.
-    pub(crate) fn scaling(&self) -> &[f64] {
-        &self.scaling
+    pub(super) fn inverse_root(&self) -> &[f64] {
+        &self.inverse_root
     }
 
     /// A bound of `A_cc^½`, from the largest radius.
-    pub(crate) fn largest_root(&self) -> f64 {
+    pub(super) fn largest_root(&self) -> f64 {
         self.largest_root
     }
 
@@ -252,7 +245,7 @@ impl ContactMatrix {
     }
 
     /// [`multiply`](Self::multiply), by two threads if there are two.
-    pub(crate) fn multiply_into(&self, x: &[f64], y: &mut Products<f64>) {
+    pub(super) fn multiply_into(&self, x: &[f64], y: &mut Products<f64>) {
         self.off_diagonal_products(x, y);
         wide(
             #[inline(always)]
@@ -268,7 +261,7 @@ impl ContactMatrix {
     }
 
     /// The [products](Self::add_products) of the off-diagonal entries of `A` itself.
-    pub(crate) fn off_diagonal_products(&self, x: &[f64], y: &mut Products<f64>) {
+    pub(super) fn off_diagonal_products(&self, x: &[f64], y: &mut Products<f64>) {
         debug_assert!(self.is_complete(), "values of other positions");
         self.products_into(&self.value, x, y);
     }
@@ -280,13 +273,7 @@ impl ContactMatrix {
     /// two sums it is the same which is added to which. So whatever numbers the contacts have and however the blocks are
     /// sorted, the bits are the same.
     #[inline(always)]
-    pub(super) fn add_products<F: Number>(
-        &self,
-        values: &[F],
-        runs: Range<usize>,
-        x: &[F],
-        y: &mut [F],
-    ) {
+    fn add_products<F: Number>(&self, values: &[F], runs: Range<usize>, x: &[F], y: &mut [F]) {
         for run in &self.runs[runs] {
             let (e, v) = (&self.end[run.ends()], &values[run.values()]);
             match run.size {
@@ -303,7 +290,7 @@ impl ContactMatrix {
     }
 
     /// The off-diagonal entries of `D^(−½) A D^(−½)` with `D = diag A`, in single precision and in the places of the others.
-    pub(crate) fn scaled(&self) -> &[f32] {
-        &self.scaled
+    pub(super) fn entries_f32(&self) -> &[f32] {
+        &self.entries_f32
     }
 }

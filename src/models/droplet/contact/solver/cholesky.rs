@@ -54,7 +54,7 @@ impl SparseCholesky {
     }
 
     /// How often a pattern was analysed.
-    pub(crate) fn symbolic_factorizations(&self) -> u64 {
+    pub(super) fn symbolic_factorizations(&self) -> u64 {
         self.factor.analyses()
     }
 

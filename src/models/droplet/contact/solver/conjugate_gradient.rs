@@ -17,8 +17,28 @@ pub struct ConjugateGradient {
     image: Products<f64>,
     largest: f64,
     /// `max |D^(−½) r|` of the residual that was computed last.
-    scaled: f64,
+    largest_weighted: f64,
     single: Single,
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Goal {
+    /// The largest residual (length).
+    pub(crate) tolerance: f64,
+    /// Whether the recurrence's own residual, with an estimate of its round-off, will do: for tolerances far above round-off. That
+    /// saves a product with the matrix.
+    pub(crate) loosely: bool,
+}
+
+/// What there is to begin with.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Start<'a> {
+    /// The products of the matrix's off-diagonal entries with the forces, if they are at hand. Those in single precision count with an
+    /// estimate of their rounding.
+    pub(crate) products: Option<First<'a>>,
+    /// The iterations done so far.
+    pub(crate) iterations: usize,
 }
 
 /// How far a solution has come.
@@ -50,41 +70,53 @@ impl ConjugateGradient {
         forces: &mut [f64],
         tolerance: f64,
     ) -> Result<usize, SolverError> {
-        self.solve_to(matrix, overlaps, forces, tolerance, false)
+        let loosely = false;
+        self.solve_to(matrix, overlaps, forces, Goal { tolerance, loosely })
     }
 
-    /// [`solve`](Self::solve), `loosely` as in [`begin`](Self::begin).
-    pub(crate) fn solve_to(
+    /// [`solve`](Self::solve), [loosely](Goal::loosely).
+    pub(crate) fn solve_loosely(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
         tolerance: f64,
-        loosely: bool,
     ) -> Result<usize, SolverError> {
-        match self.begin(matrix, overlaps, forces, (tolerance, loosely), (None, 0))? {
+        let loosely = true;
+        self.solve_to(matrix, overlaps, forces, Goal { tolerance, loosely })
+    }
+
+    fn solve_to(
+        &mut self,
+        matrix: &ContactMatrix,
+        overlaps: &[f64],
+        forces: &mut [f64],
+        goal: Goal,
+    ) -> Result<usize, SolverError> {
+        match self.begin(matrix, overlaps, forces, goal, Start::default())? {
             Progress::Done(iterations) => Ok(iterations),
             Progress::NeedsWhole(iterations) | Progress::NeedsValues(iterations) => {
-                self.finish(matrix, overlaps, forces, tolerance, iterations)
+                self.finish(matrix, overlaps, forces, goal.tolerance, iterations)
             }
         }
     }
 
     /// [`solve`](Self::solve) as far as single precision corrects the forces: each round from the residual that they really
-    /// leave. `loosely` takes the recurrence's own residual with an estimate of its round-off at the end, for tolerances far
-    /// above round-off: that saves a product with the matrix. So do `products`, those of its off-diagonal entries with the
-    /// `forces`, where they are at hand; those in single precision count with an estimate of their rounding. What
-    /// [needs values](Progress::NeedsValues) goes on here with the `iterations` it had.
+    /// leave. What [needs values](Progress::NeedsValues) goes on here.
     pub(crate) fn begin(
         &mut self,
         matrix: &ContactMatrix,
         overlaps: &[f64],
         forces: &mut [f64],
-        (tolerance, loosely): (f64, bool),
-        (mut products, mut iterations): (Option<First<'_>>, usize),
+        Goal { tolerance, loosely }: Goal,
+        start: Start<'_>,
     ) -> Result<Progress, SolverError> {
         self.prepare(matrix);
         self.single.prepare(matrix.len());
+        let Start {
+            mut products,
+            mut iterations,
+        } = start;
         loop {
             let (before, mut rounding) = (self.largest, 0.0);
             self.largest = match products.take() {
@@ -111,7 +143,7 @@ impl ConjugateGradient {
             if iterations > 0 && self.largest > 0.5 * before {
                 return Ok(Progress::NeedsWhole(iterations));
             }
-            let residual = (&self.residual[..], self.scaled);
+            let residual = (&self.residual[..], self.largest_weighted);
             let corrected = self.single.correct(matrix, residual, forces, tolerance);
             let Some((more, bound)) = corrected else {
                 return Ok(Progress::NeedsWhole(iterations));
@@ -185,11 +217,11 @@ impl ConjugateGradient {
         columns: (&[f64], &[f64], &[Q]),
         unit: f64,
     ) -> (f64, f64) {
-        let [largest, scaled, load] = wide(
+        let [largest, weighted, load] = wide(
             #[inline(always)]
             || subtract(&mut self.residual, matrix, columns, unit),
         );
-        self.scaled = scaled;
+        self.largest_weighted = weighted;
         (largest, load)
     }
 
@@ -215,15 +247,15 @@ impl ConjugateGradient {
         tolerance: f64,
         most: usize,
     ) -> Result<usize, SolverError> {
-        let scaling = matrix.scaling();
+        let roots = matrix.inverse_root();
         let mut rz = 0.0;
-        for (r, s) in self.residual.iter().zip(scaling) {
+        for (r, s) in self.residual.iter().zip(roots) {
             rz += r * r * (s * s);
         }
         self.direction.fill(0.0);
         let mut beta = 0.0;
         for iteration in 1..=most {
-            for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(scaling) {
+            for ((p, r), s) in self.direction.iter_mut().zip(&self.residual).zip(roots) {
                 *p = r * (s * s) + beta * *p;
             }
             matrix.multiply_into(&self.direction, &mut self.image);
@@ -240,7 +272,7 @@ impl ConjugateGradient {
                 forces,
                 &mut self.residual,
                 (&self.direction, self.image.sums()),
-                scaling,
+                roots,
                 alpha,
             );
             self.largest = largest;
@@ -257,8 +289,8 @@ impl ConjugateGradient {
 
 /// A product of the off-diagonal entries in a row.
 trait Product: Copy {
-    /// As a length, in a row with this diagonal and scaling.
-    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64;
+    /// As a length, in a row with this diagonal and inverse root.
+    fn length(self, diagonal: f64, inverse_root: f64, unit: f64) -> f64;
 }
 
 impl Product for f64 {
@@ -270,8 +302,8 @@ impl Product for f64 {
 
 impl Product for f32 {
     #[inline(always)]
-    fn length(self, diagonal: f64, scaling: f64, unit: f64) -> f64 {
-        f64::from(self) * (unit * (diagonal * scaling))
+    fn length(self, diagonal: f64, inverse_root: f64, unit: f64) -> f64 {
+        f64::from(self) * (unit * (diagonal * inverse_root))
     }
 }
 
@@ -294,19 +326,19 @@ fn subtract<Q: Product>(
     let (f8, f_rest) = forces.as_chunks::<8>();
     let (q8, q_rest) = products.as_chunks::<8>();
     let (a8, a_rest) = matrix.diagonal().as_chunks::<8>();
-    let (s8, s_rest) = matrix.scaling().as_chunks::<8>();
-    let (mut largest, mut scaled, mut load) = ([0.0; 8], [0.0; 8], [0.0; 8]);
+    let (s8, s_rest) = matrix.inverse_root().as_chunks::<8>();
+    let (mut largest, mut weighted, mut load) = ([0.0; 8], [0.0; 8], [0.0; 8]);
     let rows = r8.iter_mut().zip(d8).zip(f8.iter().zip(q8));
     for (((r, d), (f, q)), (a, s)) in rows.zip(a8.iter().zip(s8)) {
         for k in 0..8 {
             let af = a[k] * f[k];
             r[k] = left(d[k], af, q[k], a[k], s[k]);
             largest[k] = larger(largest[k], r[k].abs());
-            scaled[k] = larger(scaled[k], (r[k] * s[k]).abs());
+            weighted[k] = larger(weighted[k], (r[k] * s[k]).abs());
             load[k] = larger(load[k], af.abs());
         }
     }
-    let mut most = [largest, scaled, load].map(
+    let mut most = [largest, weighted, load].map(
         #[inline(always)]
         |most| most.into_iter().fold(0.0, larger),
     );
@@ -321,20 +353,20 @@ fn subtract<Q: Product>(
     most
 }
 
-/// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` behind it. The sum has four chains.
+/// A move by `α` along the direction; returns `rᵀ D⁻¹ r` and `max |r|` after it. The sum has four chains.
 #[inline(always)]
 fn advance(
     forces: &mut [f64],
     residual: &mut [f64],
     (direction, image): (&[f64], &[f64]),
-    scaling: &[f64],
+    roots: &[f64],
     alpha: f64,
 ) -> (f64, f64) {
     let (f4, f_rest) = forces.as_chunks_mut::<4>();
     let (r4, r_rest) = residual.as_chunks_mut::<4>();
     let (p4, p_rest) = direction.as_chunks::<4>();
     let (q4, q_rest) = image.as_chunks::<4>();
-    let (w4, w_rest) = scaling.as_chunks::<4>();
+    let (w4, w_rest) = roots.as_chunks::<4>();
     let (mut sums, mut largest) = ([0.0; 4], [0.0f64; 4]);
     for ((((f, r), p), q), w) in f4.iter_mut().zip(r4).zip(p4).zip(q4).zip(w4) {
         for k in 0..4 {

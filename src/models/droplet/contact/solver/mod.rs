@@ -4,6 +4,8 @@
 //! particles) and the forces of the last step are a good guess. The other two cross-check it and are its yardsticks in
 //! the benchmarks: faer's sparse Cholesky, and the dense Gauss–Jordan elimination of Saitoh 2.2.3.
 //!
+//! The direct solvers know nothing of inactive contacts: they are given sets without them.
+//!
 //! See the example of [`LinearSolver`].
 
 mod cholesky;
@@ -13,7 +15,7 @@ mod single;
 
 pub use cholesky::SparseCholesky;
 pub use conjugate_gradient::ConjugateGradient;
-pub(crate) use conjugate_gradient::Progress;
+pub(crate) use conjugate_gradient::{Goal, Progress, Start};
 pub use gauss_jordan::GaussJordan;
 
 use super::matrix::ContactMatrix;
@@ -156,16 +158,8 @@ impl LinearSolver {
         }
     }
 
-    /// `max |A f − δ|` of the last solution (length), where the solver knows it.
-    pub(crate) fn largest_residual(&self) -> Option<f64> {
-        match self {
-            Self::ConjugateGradient(cg) => Some(cg.largest_residual()),
-            Self::SparseCholesky(_) | Self::GaussJordan(_) => None,
-        }
-    }
-
     /// How often a pattern was analysed.
-    pub(crate) fn symbolic_factorizations(&self) -> u64 {
+    pub(super) fn symbolic_factorizations(&self) -> u64 {
         match self {
             Self::SparseCholesky(cholesky) => cholesky.symbolic_factorizations(),
             Self::ConjugateGradient(_) | Self::GaussJordan(_) => 0,

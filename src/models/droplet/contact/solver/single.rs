@@ -11,8 +11,8 @@
 //!
 //! **Sums without an order.** The contacts have other numbers in a run that goes on than in one that is taken up at a frame, and
 //! some of them are inactive. Inner products are therefore summed as integers: the products are rounded to a multiple of
-//! [`STEPS`]⁻¹ of the largest that there could be, and sums of integers are exact. The bits do not depend on numbers, gaps, wide
-//! vectors or anything but the contacts. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
+//! [`STEPS`]⁻¹ of the largest that there could be, and sums of integers are exact. The bits do not depend on numbers, on inactive
+//! contacts or on wide vectors. (The idea is that of J. Demmel and H. D. Nguyen, IEEE Trans. Comput. 64, 2060 (2015).)
 
 use crate::models::droplet::contact::matrix::ContactMatrix;
 use crate::models::droplet::contact::matrix::product::Products;
@@ -40,7 +40,7 @@ const NONE: u32 = (3.0 * STEPS).to_bits();
 const ROW: f32 = 64.0;
 
 /// Numbers that are summed before the sums are widened: 256 of up to [`STEPS`] in each of the chains.
-const STRETCH: usize = 256 * CHAINS;
+const BATCH: usize = 256 * CHAINS;
 const CHAINS: usize = 16;
 
 /// The vectors.
@@ -74,7 +74,7 @@ impl Single {
         forces: &mut [f64],
         goal: f64,
     ) -> Option<(usize, f64)> {
-        let scaling = matrix.scaling();
+        let roots = matrix.inverse_root();
         let inverse = 1.0 / scale;
         if !(scale.is_finite() && inverse.is_finite()) {
             return None;
@@ -90,7 +90,7 @@ impl Single {
         let squares = wide(
             #[inline(always)]
             || {
-                for ((own, r), s) in self.residual.iter_mut().zip(residual).zip(scaling) {
+                for ((own, r), s) in self.residual.iter_mut().zip(residual).zip(roots) {
                     *own = (r * s * inverse) as f32;
                 }
                 let squares = self.residual.iter().map(|r| ones.integer(*r, *r));
@@ -101,7 +101,7 @@ impl Single {
         for iteration in 1..=ITERATIONS {
             turn(&mut self.direction, &self.residual, beta);
             most_p = most_r + beta.abs() * most_p;
-            matrix.products_into(matrix.scaled(), &self.direction, &mut self.image);
+            matrix.products_into(matrix.entries_f32(), &self.direction, &mut self.image);
             let image = self.image.sums_mut();
             let (curvature, most_q) = collect(image, &self.direction, most_p)?;
             if curvature <= 0.0 {
@@ -123,7 +123,7 @@ impl Single {
                 wide(
                     #[inline(always)]
                     || {
-                        for ((f, u), s) in forces.iter_mut().zip(&self.correction).zip(scaling) {
+                        for ((f, u), s) in forces.iter_mut().zip(&self.correction).zip(roots) {
                             *f += f64::from(*u) * (scale * s);
                         }
                     },
@@ -141,7 +141,7 @@ impl Single {
 /// Where a column of so many numbers is cut for two threads; at its end if it is too short for both.
 fn half(length: usize) -> usize {
     if are_two_for(length) {
-        (length / 2).next_multiple_of(STRETCH).min(length)
+        (length / 2).next_multiple_of(BATCH).min(length)
     } else {
         length
     }
@@ -193,7 +193,7 @@ fn collect(image: &mut [f32], direction: &[f32], most: f32) -> Option<(f64, f32)
 #[inline(always)]
 fn collect_here(image: &mut [f32], direction: &[f32], rounding: Rounding, sum: &mut Sum) {
     let mut largest = [0; CHAINS];
-    for (q, p) in image.chunks_mut(STRETCH).zip(direction.chunks(STRETCH)) {
+    for (q, p) in image.chunks_mut(BATCH).zip(direction.chunks(BATCH)) {
         let (q16, q_rest) = q.as_chunks_mut::<CHAINS>();
         let (p16, p_rest) = p.as_chunks::<CHAINS>();
         let mut sums = [0; CHAINS];
@@ -214,7 +214,7 @@ fn collect_here(image: &mut [f32], direction: &[f32], rounding: Rounding, sum: &
     sum.largest = largest.into_iter().fold(0, u32::max);
 }
 
-/// A move by `α` along the direction; returns `rᵀ r` and the largest `|r|` behind it. `most` bounds `|r|`. `None` if a number is
+/// A move by `α` along the direction; returns `rᵀ r` and the largest `|r|` after it. `most` bounds `|r|`. `None` if a number is
 /// none, or out of hand.
 fn advance(
     correction: &mut [f32],
@@ -255,9 +255,9 @@ fn advance_here(
     sum: &mut Sum,
 ) {
     let mut largest = [0; CHAINS];
-    let moved = correction.chunks_mut(STRETCH);
-    let moved = moved.zip(residual.chunks_mut(STRETCH));
-    let by = direction.chunks(STRETCH).zip(image.chunks(STRETCH));
+    let moved = correction.chunks_mut(BATCH);
+    let moved = moved.zip(residual.chunks_mut(BATCH));
+    let by = direction.chunks(BATCH).zip(image.chunks(BATCH));
     for ((u, r), (p, q)) in moved.zip(by) {
         let (u16, u_rest) = u.as_chunks_mut::<CHAINS>();
         let (r16, r_rest) = r.as_chunks_mut::<CHAINS>();
@@ -411,7 +411,7 @@ mod tests {
                 if far_above_round_off {
                     forces.fill(0.0);
                     solver
-                        .solve_to(matrix, overlaps, &mut forces, tolerance, true)
+                        .solve_loosely(matrix, overlaps, &mut forces, tolerance)
                         .unwrap();
                     let (left, bound) = (
                         residual(matrix, overlaps, &forces),
@@ -441,7 +441,7 @@ mod tests {
             let mut forces = vec![0.0; 2];
             let mut solver = ConjugateGradient::default();
             solver
-                .solve_to(&matrix, &overlaps, &mut forces, 1e-9, true)
+                .solve_loosely(&matrix, &overlaps, &mut forces, 1e-9)
                 .unwrap();
             let left = residual(&matrix, &overlaps, &forces);
             assert!(left <= 1e-9, "{left:e} at {angle:e}");

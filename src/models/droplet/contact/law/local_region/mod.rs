@@ -1,21 +1,22 @@
 //! A region of contacts on which the forces are corrected: see [`local_update`](super::local_update).
 //!
-//! - A contact's number is that of the set; contacts that came in this local update follow behind.
+//! - A contact's number is that of the set; contacts that came in this local update follow after.
 //! - `place` of a contact is its row in `rows` and `contacts`, or `NOWHERE`, or `GONE` if it is inactive.
 //! - A particle with a block has all its active contacts in the region; a contact may have one particle without.
 //! - Between local updates the region is empty, every `place` is `NOWHERE` and every `left_of` is 0.
 
+mod descent;
+
+use super::Violation;
 use crate::models::droplet::contact::geometry::Geometry;
 use crate::models::droplet::contact::matrix::compliance;
+use crate::models::droplet::contact::set::ContactSet;
 use crate::models::droplet::kernel::Direction;
-use crate::state::Packing;
-
-/// Iterations that are tried.
-const ITERATIONS: usize = 40;
+use crate::state::{Packing, unit_and_length};
 
 /// A contact that is in no region, and one that has left the set.
-pub(super) const NOWHERE: u32 = u32::MAX;
-pub(super) const GONE: u32 = u32::MAX - 1;
+const NOWHERE: u32 = u32::MAX;
+const GONE: u32 = u32::MAX - 1;
 
 /// A contact that came to the set.
 #[derive(Clone, Debug)]
@@ -39,38 +40,38 @@ impl Added {
 #[derive(Clone, Debug, Default)]
 pub(super) struct LocalRegion {
     /// The forces of all contacts with the exchanges that were made.
-    pub(super) forces: Vec<f64>,
+    forces: Vec<f64>,
     /// Where each contact is in the region, or one of the marks.
-    pub(super) place: Vec<u32>,
-    /// The contacts that have left.
-    pub(super) gone: Vec<u32>,
+    place: Vec<u32>,
+    /// The active contacts of the set that have left.
+    gone: Vec<u32>,
     added: Vec<Added>,
     /// `(particle, partner, number in added)`, ascending.
-    pub(super) added_of: Vec<[u32; 3]>,
+    added_of: Vec<[u32; 3]>,
     /// The block of each particle, [`NOWHERE`] if it is not in the region, and the particles of the blocks.
-    pub(super) block: Vec<u32>,
-    pub(super) particles: Vec<u32>,
+    block: Vec<u32>,
+    particles: Vec<u32>,
     /// Where the members of each particle's block end.
-    pub(super) ends: Vec<usize>,
+    ends: Vec<usize>,
     /// Places of the blocks' contacts, and their directions.
-    pub(super) member: Vec<u32>,
-    pub(super) toward: Vec<Direction>,
+    member: Vec<u32>,
+    toward: Vec<Direction>,
     /// The blocks' entries of `A`, as in [`ContactMatrix`](crate::models::droplet::contact::matrix::ContactMatrix).
-    pub(super) value: Vec<f64>,
+    value: Vec<f64>,
     /// The contacts of the region, with their vectors.
-    pub(super) contacts: Vec<u32>,
-    pub(super) rows: Vec<Row>,
+    contacts: Vec<u32>,
+    rows: Vec<Row>,
     room: Vec<(usize, Direction)>,
     /// The particles of the regions of this round, and which they are.
-    pub(super) visited: Vec<u32>,
-    pub(super) is_visited: Vec<bool>,
+    visited: Vec<u32>,
+    is_visited: Vec<bool>,
     /// The residual that regions have left at each contact (length), and the contacts where there is any.
-    pub(super) left_of: Vec<f64>,
+    left_of: Vec<f64>,
     reached: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Row {
+struct Row {
     diagonal: f64,
     inverse: f64,
     residual: f64,
@@ -107,19 +108,121 @@ impl<'a> Whole<'a> {
 }
 
 impl LocalRegion {
+    /// Begins a local update, with the forces of the set, which are lent.
+    pub(super) fn begin(&mut self, set: &mut ContactSet, particles: usize) {
+        self.place.resize(set.len(), NOWHERE);
+        self.left_of.resize(set.len(), 0.0);
+        self.block.resize(particles, NOWHERE);
+        self.is_visited.resize(particles, false);
+        for &c in set.inactive() {
+            self.place[c as usize] = GONE;
+        }
+        self.forces = set.lend_forces();
+    }
+
+    /// Ends the local update: lists the exchanges that were made, in the order of pairs, and returns the forces to the set, which
+    /// knows nothing of the exchanges yet.
+    pub(super) fn finish(&mut self, set: &mut ContactSet, exchanges: &mut Vec<Violation>) {
+        exchanges.clear();
+        for &c in &self.gone {
+            let c = c as usize;
+            exchanges.push(Violation::Drop(c, set.pairs()[c]));
+        }
+        let inactive = set.inactive().iter().map(|c| *c as usize);
+        let added = self.added.iter().map(|added| added.pair);
+        let came = inactive.zip(set.inactive_pairs());
+        for (contact, pair) in came.chain((set.len()..).zip(added)) {
+            if !self.is_gone(contact) {
+                exchanges.push(Violation::Add(pair, self.forces[contact]));
+            }
+        }
+        exchanges.sort_unstable_by_key(|exchange| exchange.pair());
+        self.clear();
+        self.begin_round();
+        for c in self.reached.drain(..) {
+            self.left_of[c as usize] = 0.0;
+        }
+        for c in self.gone.drain(..).chain(set.inactive().iter().copied()) {
+            self.place[c as usize] = NOWHERE;
+        }
+        self.left_of.truncate(set.len());
+        self.place.truncate(set.len());
+        self.added.clear();
+        self.added_of.clear();
+        set.return_forces(core::mem::take(&mut self.forces));
+    }
+
+    /// The forces of all contacts with the exchanges that were made.
+    pub(super) fn forces(&self) -> &[f64] {
+        &self.forces
+    }
+
+    /// Whether a contact is inactive or has left.
+    pub(super) fn is_gone(&self, contact: usize) -> bool {
+        self.place[contact] == GONE
+    }
+
+    /// The active contacts of the set that have left.
+    pub(super) fn gone(&self) -> &[u32] {
+        &self.gone
+    }
+
+    /// The particles of this round's regions.
+    pub(super) fn visited(&self) -> &[u32] {
+        &self.visited
+    }
+
+    /// Whether one of the particles is in a region of this round.
+    pub(super) fn is_near(&self, pair: [u32; 2]) -> bool {
+        pair.iter().any(|p| self.is_visited[*p as usize])
+    }
+
+    /// A contact leaves; returns its force.
+    pub(super) fn remove(&mut self, set: &ContactSet, contact: usize) -> f64 {
+        self.place[contact] = GONE;
+        if contact < set.len() && set.is_active(contact) {
+            self.gone.push(contact as u32);
+        }
+        core::mem::take(&mut self.forces[contact])
+    }
+
+    /// A pair comes, or comes back, with a first guess of its force; returns its contact.
+    pub(super) fn add(&mut self, whole: Whole<'_>, pair: [u32; 2], guess: f64) -> usize {
+        let contact = if let Some(contact) = self.find(whole, pair) {
+            self.gone.retain(|&c| c as usize != contact);
+            self.place[contact] = NOWHERE;
+            contact
+        } else {
+            let [i, j] = pair.map(|p| p as usize);
+            let (normal, _) = unit_and_length(whole.packing.separation(i, j));
+            let ([i, j], k) = (pair, self.added.len() as u32);
+            let toward = Direction::of(-normal);
+            self.added.push(Added { pair, toward });
+            self.added_of.extend([[i, j, k], [j, i, k]]);
+            self.added_of.sort_unstable();
+            self.place.push(NOWHERE);
+            self.left_of.push(0.0);
+            self.forces.push(0.0);
+            self.forces.len() - 1
+        };
+        self.forces[contact] = guess;
+        contact
+    }
+
     /// The number of a pair that came and may have gone again.
-    pub(super) fn find(&self, whole: Whole<'_>, pair: [u32; 2]) -> Option<usize> {
+    fn find(&self, whole: Whole<'_>, pair: [u32; 2]) -> Option<usize> {
         let numbered = whole.geometry.duplicate().find(pair);
         let added = || self.find_added(pair).map(|k| whole.pairs.len() + k);
         numbered.map(|c| c as usize).or_else(added)
     }
 
-    /// The pairs that came, some of which may have gone again.
-    pub(super) fn added_pairs(&self) -> impl Iterator<Item = [u32; 2]> {
-        self.added.iter().map(|added| added.pair)
+    /// Whether a pair that the set has no number for has come, and not gone again.
+    pub(super) fn has_come(&self, whole: Whole<'_>, pair: [u32; 2]) -> bool {
+        let came = self.find_added(pair);
+        came.is_some_and(|k| !self.is_gone(whole.pairs.len() + k))
     }
 
-    pub(super) fn find_added(&self, pair: [u32; 2]) -> Option<usize> {
+    fn find_added(&self, pair: [u32; 2]) -> Option<usize> {
         let mut of = self.added_of(pair[0]).map(|(k, _)| k);
         of.find(|&k| self.added[k].pair == pair)
     }
@@ -133,7 +236,7 @@ impl LocalRegion {
     }
 
     /// The contacts that came to particle `p`, with their directions, in the order of its partners.
-    pub(super) fn added_of(&self, p: u32) -> impl Iterator<Item = (usize, Direction)> {
+    fn added_of(&self, p: u32) -> impl Iterator<Item = (usize, Direction)> {
         let begin = self.added_of.partition_point(|a| a[0] < p);
         let of = self.added_of[begin..].iter().take_while(move |a| a[0] == p);
         of.map(move |&[_, _, k]| {
@@ -222,32 +325,6 @@ impl LocalRegion {
         sum
     }
 
-    /// One more contact that came, in the direction from its lower particle to the higher.
-    pub(super) fn add(&mut self, pair: [u32; 2], toward: Direction) {
-        let ([i, j], k) = (pair, self.added.len() as u32);
-        self.added.push(Added { pair, toward });
-        self.added_of.extend([[i, j, k], [j, i, k]]);
-        self.added_of.sort_unstable();
-        self.place.push(NOWHERE);
-        self.left_of.push(0.0);
-    }
-
-    /// Forgets the exchanges too.
-    pub(super) fn finish(&mut self) {
-        self.clear();
-        self.begin_round();
-        for c in self.reached.drain(..) {
-            self.left_of[c as usize] = 0.0;
-        }
-        self.left_of.truncate(self.left_of.len() - self.added.len());
-        for c in self.gone.drain(..) {
-            self.place[c as usize] = NOWHERE;
-        }
-        self.place.truncate(self.place.len() - self.added.len());
-        self.added.clear();
-        self.added_of.clear();
-    }
-
     /// Takes particle `p` into the region, with all its contacts.
     fn take_in(&mut self, whole: Whole<'_>, p: u32) {
         if self.block[p as usize] != NOWHERE {
@@ -264,11 +341,11 @@ impl LocalRegion {
         }
         self.room = contacts;
         self.ends.push(self.member.len());
-        let scale = -whole.packing.radii()[i] * whole.per_radius;
+        let factor = -whole.packing.radii()[i] * whole.per_radius;
         let toward = &self.toward[first..];
         for b in 1..toward.len() {
             for a in &toward[..b] {
-                self.value.push(scale * a.g_between(toward[b]));
+                self.value.push(factor * a.g_between(toward[b]));
             }
         }
     }
@@ -293,103 +370,5 @@ impl LocalRegion {
         }
         self.member.push(place);
         self.toward.push(toward);
-    }
-
-    /// The residual next to a contact whose force was changed by `change`.
-    pub(super) fn disturb(&mut self, whole: Whole<'_>, contact: usize, change: f64) {
-        for p in self.pair(whole, contact) {
-            self.take_in(whole, p);
-            let Some(own) = self.direction_at(whole, p, contact) else {
-                continue;
-            };
-            let scale = -whole.packing.radii()[p as usize] * whole.per_radius;
-            let block = self.block[p as usize] as usize;
-            let first = if block == 0 { 0 } else { self.ends[block - 1] };
-            for k in first..self.ends[block] {
-                let place = self.member[k];
-                if self.contacts[place as usize] as usize != contact {
-                    let entry = scale * own.g_between(self.toward[k]);
-                    self.rows[place as usize].residual -= entry * change;
-                }
-            }
-        }
-    }
-
-    /// Adds the correction to the forces; returns the iterations and the largest residual left. Does nothing if the region
-    /// outgrows `most` contacts or the iterations do not end.
-    pub(super) fn descend(
-        &mut self,
-        whole: Whole<'_>,
-        tolerance: f64,
-        most: usize,
-    ) -> Option<(usize, f64)> {
-        let (mut rz, mut largest) = (0.0, 0.0f64);
-        for row in &self.rows {
-            rz += row.residual * row.residual * row.inverse;
-            largest = largest.max(row.residual.abs());
-        }
-        let (mut beta, mut grown) = (0.0, 0);
-        for iteration in 0..ITERATIONS {
-            // A NaN hides from the largest entry, but not from the sum.
-            if largest <= tolerance && f64::is_finite(rz) {
-                for (row, &c) in self.rows.iter().zip(&self.contacts) {
-                    self.forces[c as usize] += row.correction;
-                }
-                return Some((iteration, largest));
-            }
-            let reached = self.rows.len();
-            for row in &mut self.rows {
-                row.direction = row.residual * row.inverse + beta * row.direction;
-            }
-            for place in grown..reached {
-                for p in self.pair(whole, self.contacts[place] as usize) {
-                    self.take_in(whole, p);
-                }
-            }
-            grown = reached;
-            if self.rows.len() > most {
-                return None;
-            }
-            self.product();
-            let curvature: f64 = self.rows.iter().map(|row| row.direction * row.image).sum();
-            if curvature.is_nan() || curvature <= 0.0 {
-                return None;
-            }
-            let alpha = rz / curvature;
-            let mut next = 0.0;
-            largest = 0.0;
-            for row in &mut self.rows {
-                row.correction += alpha * row.direction;
-                row.residual -= alpha * row.image;
-                next += row.residual * row.residual * row.inverse;
-                largest = largest.max(row.residual.abs());
-            }
-            beta = next / rz;
-            rz = next;
-        }
-        None
-    }
-
-    /// The images of the directions.
-    fn product(&mut self) {
-        let rows = &mut self.rows[..];
-        for row in &mut *rows {
-            row.image = row.diagonal * row.direction;
-        }
-        let (mut first, mut values) = (0, self.value.iter());
-        for &end in &self.ends {
-            let members = &self.member[first..end];
-            first = end;
-            for (b, &cb) in members.iter().enumerate() {
-                let at = rows[cb as usize].direction;
-                let mut sum = 0.0;
-                for (&ca, entry) in members[..b].iter().zip(&mut values) {
-                    let row = &mut rows[ca as usize];
-                    row.image += entry * at;
-                    sum += entry * row.direction;
-                }
-                rows[cb as usize].image += sum;
-            }
-        }
     }
 }
