@@ -96,7 +96,7 @@ impl McapSource {
             path: path.to_owned(),
             missing,
         };
-        let mut stream = Stream::open(source, length, budget).map_err(not_mcap)?;
+        let mut stream = Stream::open(source, length, budget);
         let mut topics = Topics::default();
         let mut about: Option<About> = None;
         let mut toml: Option<String> = None;

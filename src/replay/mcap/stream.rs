@@ -1,190 +1,159 @@
-//! The records of an MCAP file: which bytes belong to which, and whether their checksums are right.
+//! The records of an MCAP file, those of its chunks among them.
 //!
-//! The file is framed here because the library's reader allocates what a record claims to be long and takes a file that
-//! breaks off for a broken one. The records themselves are decoded by the library.
+//! The library says which bytes belong to which record and whether the checksums over data and summary are right. What it
+//! asks for is held against the file's length and the budget first. Chunks are unpacked here: its reader waits for ever for
+//! what a chunk claims and does not hold, and reads on behind a chunk that ends within a record.
 
 use crate::budget::Budget;
 use crate::replay::source::{Ending, Problem, guarded, more_behind};
 use crate::text::{counted, shown};
-use mcap::MAGIC;
-use mcap::records::{ChunkHeader, Record, op};
+use mcap::McapError;
+use mcap::records::{ChunkHeader, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use rerun::external::re_log_encoding::external::lz4_flex;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, ErrorKind, Read};
 
 /// An MCAP file that is being read, record by record, chunks unpacked.
 pub(super) struct Stream {
-    source: Box<dyn Read + Send>,
-    length: u64,
-    offset: u64,
-    /// The record at hand: operation code, length, body.
-    bytes: Vec<u8>,
-    /// Checksum of the section that is being read.
-    checksum: crc32fast::Hasher,
-    ending: Option<Ending>,
-    /// The unpacked chunk that is being read, and how far.
-    chunk: Cursor<Vec<u8>>,
+    file: Records,
+    /// The unpacked chunk that is being read.
+    chunk: Option<Records>,
     budget: Budget,
 }
 
-/// Bytes of an operation code and a length.
-const HEAD: usize = 9;
+/// Records one behind the other.
+struct Records {
+    source: Box<dyn Read + Send>,
+    length: u64,
+    offset: u64,
+    reader: LinearReader,
+    /// The byte of the file at which the chunk begins that holds them.
+    chunk: Option<u64>,
+    /// Whether the data have been read: behind them stand indexes, which are not needed, and a footer.
+    behind: bool,
+    ending: Option<Ending>,
+}
+
+enum Step {
+    Record(Record<'static>),
+    /// So many bytes are missing.
+    Missing(usize),
+    End,
+}
 
 impl Stream {
     /// Starts to read a source of `length` bytes.
-    pub fn open(source: Box<dyn Read + Send>, length: u64, budget: Budget) -> Result<Self, String> {
-        let mut stream = Self {
-            source,
-            length,
-            offset: 0,
-            bytes: Vec::new(),
-            checksum: crc32fast::Hasher::new(),
-            ending: None,
-            chunk: Cursor::default(),
+    pub fn open(source: Box<dyn Read + Send>, length: u64, budget: Budget) -> Self {
+        Self {
+            file: Records::new(source, length, None),
+            chunk: None,
             budget,
-        };
-        if !stream.read(MAGIC.len() as u64)? || stream.bytes != MAGIC {
-            return Err("it does not begin like one".to_owned());
         }
-        stream.checksum.update(MAGIC);
-        Ok(stream)
     }
 
     /// How the file ended; `None` before its end.
     pub fn ending(&self) -> Option<Ending> {
-        self.ending
+        self.file.ending
     }
 
     /// The next record of the data section, chunks taken apart; `None` at the end.
     pub fn next(&mut self) -> Result<Option<Record<'static>>, Problem> {
         loop {
-            if let Some(record) = self.next_in_chunk()? {
-                return Ok(Some(record));
+            if let Some(chunk) = self.chunk.as_mut().filter(|chunk| chunk.left() > 0) {
+                let record = chunk.next(self.budget)?;
+                let cut = || "a chunk ends within a record".to_owned().into();
+                return record.ok_or_else(cut).map(Some);
             }
-            let start = self.offset;
-            let at = |problem: String| format!("the record at byte {start}: {problem}");
-            let Some(opcode) = self.next_outside()? else {
-                return Ok(None);
-            };
-            if opcode != op::DATA_END {
-                self.checksum.update(&self.bytes);
-            }
-            match parse(opcode, &self.bytes[HEAD..]).map_err(at)? {
-                Record::DataEnd(end) => {
-                    let saved = end.data_section_crc;
-                    let checksum = core::mem::take(&mut self.checksum).finalize();
-                    if saved != 0 && saved != checksum {
-                        return Err("the checksum over the data is wrong".to_owned().into());
-                    }
-                    return self.read_summary();
-                }
-                Record::Chunk { header, data } => {
+            let start = self.file.offset;
+            match self.file.next(self.budget)? {
+                Some(Record::Chunk { header, data }) => {
                     let name = format_args!("the chunk at byte {start}, unpacked,");
                     self.budget.allow_piece(name, header.uncompressed_size)?;
-                    self.chunk = Cursor::new(unpack(&header, &data).map_err(at)?);
+                    let at = |problem| format!("the record at byte {start}: {problem}");
+                    let bytes = Cursor::new(unpack(&header, &data).map_err(at)?);
+                    let length = header.uncompressed_size;
+                    self.chunk = Some(Records::new(Box::new(bytes), length, Some(start)));
                 }
                 // What points at other records; the records are read in their order.
-                Record::MessageIndex(_) => {}
-                record => return Ok(Some(record)),
+                Some(Record::MessageIndex(_) | Record::Unknown { .. }) => {}
+                other => return Ok(other),
             }
         }
     }
+}
 
-    /// The next record of the open chunk.
-    fn next_in_chunk(&mut self) -> Result<Option<Record<'static>>, String> {
-        const CUT: &str = "a chunk ends within a record";
-        let start = self.chunk.position() as usize;
-        let rest = &self.chunk.get_ref()[start..];
-        if rest.is_empty() {
-            return Ok(None);
+impl Records {
+    fn new(source: Box<dyn Read + Send>, length: u64, chunk: Option<u64>) -> Self {
+        let in_file = chunk.is_none();
+        Self {
+            source,
+            length,
+            offset: 0,
+            reader: LinearReader::new_with_options(LinearReaderOptions {
+                skip_start_magic: !in_file,
+                skip_end_magic: !in_file,
+                emit_chunks: true,
+                validate_data_section_crc: in_file,
+                validate_summary_section_crc: in_file,
+                record_length_limit: usize::try_from(length.saturating_sub(9)).ok(),
+                ..LinearReaderOptions::default()
+            }),
+            chunk,
+            behind: false,
+            ending: None,
         }
-        let (head, rest) = rest.split_first_chunk::<HEAD>().ok_or(CUT)?;
-        let body = length(head).and_then(|n| rest.get(..n)).ok_or(CUT)?;
-        let record = parse(head[0], body)?;
-        let end = start + HEAD + body.len();
-        self.chunk.set_position(end as u64);
-        Ok(Some(record))
     }
 
-    /// Reads a record whole; its operation code, or `None` where the file breaks off.
-    fn next_outside(&mut self) -> Result<Option<u8>, Problem> {
-        if self.ending.is_some() {
-            return Ok(None);
-        }
-        self.bytes.clear();
-        if self.read(HEAD as u64)? {
-            let head = self.bytes.first_chunk::<HEAD>();
-            // A length beyond any machine's memory lies behind the end of any file.
-            let body = head.and_then(length).unwrap_or(usize::MAX) as u64;
-            if body <= self.length - self.offset {
-                let start = self.offset - HEAD as u64;
-                let name = format_args!("the record at byte {start}");
-                self.budget.allow_piece(name, body)?;
-                self.read(body)?;
-                return Ok(self.bytes.first().copied());
-            }
-        }
-        self.ending = Some(Ending::BreaksOff);
-        Ok(None)
+    fn left(&self) -> u64 {
+        self.length - self.offset
     }
 
-    /// Behind the data: indexes, which are not needed, a footer with a checksum over them, and nothing else.
-    fn read_summary(&mut self) -> Result<Option<Record<'static>>, Problem> {
-        while let Some(opcode) = self.next_outside()? {
-            if opcode != op::FOOTER {
-                self.checksum.update(&self.bytes);
-                continue;
-            }
-            let Record::Footer(footer) = parse(opcode, &self.bytes[HEAD..])? else {
-                return Err("its footer is not one".to_owned().into());
+    /// The next record; `None` at the end and where a record is not whole.
+    fn next(&mut self, budget: Budget) -> Result<Option<Record<'static>>, Problem> {
+        let name = format!("the record at byte {}", self.chunk.unwrap_or(self.offset));
+        loop {
+            let step = guarded(|| step(&mut self.reader, self.behind));
+            self.ending = match step.map_err(|problem| format!("{name}: {problem}"))? {
+                Step::Record(record) => {
+                    self.behind |= self.chunk.is_none() && matches!(record, Record::DataEnd(_));
+                    return Ok(Some(record));
+                }
+                Step::Missing(need) if need as u64 <= self.left() => {
+                    budget.allow_piece(&name, need as u64)?;
+                    let read = self.source.read_exact(self.reader.insert(need));
+                    read.map_err(|error| match error.kind() {
+                        ErrorKind::UnexpectedEof => {
+                            "the file became shorter while it was read".to_owned()
+                        }
+                        _ => error.to_string(),
+                    })?;
+                    self.reader.notify_read(need);
+                    self.offset += need as u64;
+                    continue;
+                }
+                Step::End if self.left() > 0 => return Err(more_behind(self.left()).into()),
+                Step::End if self.behind => Some(Ending::Closed),
+                _ => Some(Ending::BreaksOff),
             };
-            self.checksum.update(&self.bytes[..HEAD + 16]);
-            let checksum = core::mem::take(&mut self.checksum).finalize();
-            if footer.summary_crc != 0 && footer.summary_crc != checksum {
-                return Err("the checksum over the summary is wrong".to_owned().into());
-            }
-            self.bytes.clear();
-            if !self.read(MAGIC.len() as u64)? {
-                break;
-            }
-            if self.bytes != MAGIC {
-                return Err("it does not end like an MCAP file".to_owned().into());
-            }
-            if self.offset < self.length {
-                let more = self.length - self.offset;
-                return Err(more_behind(more).into());
-            }
-            self.ending = Some(Ending::Closed);
             return Ok(None);
         }
-        self.ending = Some(Ending::BreaksOff);
-        Ok(None)
-    }
-
-    /// Appends `count` bytes to the buffer; `false` if the file has not so many left.
-    fn read(&mut self, count: u64) -> Result<bool, String> {
-        if count > self.length - self.offset {
-            return Ok(false);
-        }
-        let source = self.source.by_ref();
-        let read = source.take(count).read_to_end(&mut self.bytes);
-        let read = read.map_err(|e| e.to_string())? as u64;
-        self.offset += read;
-        if read < count {
-            return Err("the file became shorter while it was read".to_owned());
-        }
-        Ok(true)
     }
 }
 
-fn length(head: &[u8; HEAD]) -> Option<usize> {
-    let [_, length @ ..] = *head;
-    usize::try_from(u64::from_le_bytes(length)).ok()
-}
-
-fn parse(opcode: u8, body: &[u8]) -> Result<Record<'static>, String> {
-    guarded(|| {
-        let record = mcap::parse_record(opcode, body).map_err(|e| e.to_string())?;
-        Ok(record.into_owned())
+/// Reads on; what stands behind the data is not decoded.
+fn step(reader: &mut LinearReader, behind: bool) -> Result<Step, String> {
+    Ok(match reader.next_event().transpose() {
+        Ok(Some(LinearReadEvent::Record { opcode, data })) => {
+            let opcode = if behind { 0 } else { opcode };
+            let record = mcap::parse_record(opcode, data).map_err(|e| e.to_string())?;
+            Step::Record(record.into_owned())
+        }
+        Ok(Some(LinearReadEvent::ReadRequest(need))) => Step::Missing(need),
+        // Longer than the file.
+        Err(McapError::RecordTooLarge { .. }) => Step::Missing(usize::MAX),
+        Err(McapError::BadMagic) => return Err("it does not end like an MCAP file".to_owned()),
+        Err(error) => return Err(error.to_string()),
+        Ok(None) => Step::End,
     })
 }
 
