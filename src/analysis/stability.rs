@@ -101,6 +101,9 @@ const PRESTRESS: f64 = 0.9;
 /// What the forces inside a product are right to.
 const ACCURACY: f64 = 1e-2;
 
+/// Above this `f_max` (units of γ) forces no larger than it may hold a packing as well as not.
+const ROUGH: f64 = 1e-6;
+
 /// What is left of a product behind this length is rounding: products of unit vectors are of length 1, about.
 const NOTHING: f64 = 1e-8;
 
@@ -139,7 +142,14 @@ pub(crate) fn judge(packing: &Packing, model: &AnyModel) -> Judgement {
     let bearing = contacts.forces.iter().zip(&borne).filter(|(_, b)| **b);
     let (number, sum) = bearing.fold((0.0, 0.0), |(n, s), (f, _)| (n + 1.0, s + f));
     if number == 0.0 {
-        return Stability::NotJammed.into();
+        // Far from balance it does not show who bears a force.
+        let told = model.f_max() <= ROUGH;
+        let stability = if told {
+            Stability::NotJammed
+        } else {
+            Stability::NotJudged
+        };
+        return stability.into();
     }
     if sum < BALANCED * net * number || contacts.distances.contains(&0.0) {
         return Stability::NotJudged.into();

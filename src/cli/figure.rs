@@ -233,7 +233,8 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
             let model = scene.stage(frame.stage).model;
             if style.color == ColorBy::Deformation && model == Kind::Disks {
                 format!(
-                    "{shown} is of disks, which keep their shape: --color deformation has nothing to show"
+                    "step {} of {shown} is of disks, which keep their shape: --color deformation has nothing to show",
+                    frame.step
                 )
             } else {
                 let packing = recording.packing(&frame)?;

@@ -62,6 +62,8 @@ struct Findings {
     metrics: BTreeMap<&'static str, f64>,
     /// The last state.
     last: Option<Frame>,
+    /// The first recorded step of the droplets, where their disks are recorded before them.
+    droplets_from: Option<u64>,
     result: Option<Outcome>,
     damage: Option<ReadError>,
 }
@@ -73,6 +75,9 @@ impl Findings {
             let (channel, step) = match event {
                 Ok(Event::State(frame)) => {
                     let step = frame.step;
+                    if frame.stage > 0 {
+                        found.droplets_from.get_or_insert(step);
+                    }
                     found.last = Some(frame);
                     ("state", step)
                 }
@@ -218,6 +223,12 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
     let (n, phi) = (recording.radii().len(), recording.coverage());
     let gamma = format!("γ = {}", scene.line_tension);
     lines.packing(scene, n, phi, recording.domain(), &gamma);
+    if let Some(step) = found.droplets_from {
+        lines.line(
+            "stages",
+            format!("undeformed disks, then droplets from step {step}"),
+        );
+    }
     let from = recording.from_step();
     if from > 0 {
         let changed = recording.legs().iter().any(|leg| leg.changes(scene));
@@ -301,6 +312,7 @@ fn json(path: &str, recording: &Recording, found: &Findings) -> Value {
         "program": recording.program(),
         "bits": recording.bits(),
         "model": scene.model.name(),
+        "droplets_from": found.droplets_from,
         "particles": recording.radii().len(),
         "phi": recording.coverage(),
         "seed": (!scene.starts_from_file()).then_some(scene.seed),

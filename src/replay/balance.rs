@@ -128,6 +128,10 @@ impl Balance {
         let ratio = packing.largest_radius() / packing.smallest_radius();
         let forces = (AMPLIFIED * ratio * found.promised).max(ALLOWED);
         self.equation_4.of(found.residual, lengths, step);
+        if self.scene.admits(frame).is_err() {
+            // No law holds what no run can have.
+            self.equation_4.of(f64::NAN, lengths, step);
+        }
         self.overlap.of(found.overlap, lengths, step);
         self.pull.of(found.pull, 0.0, step);
         for (name, recorded) in metrics {

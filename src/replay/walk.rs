@@ -72,6 +72,16 @@ impl Segment {
                 return Ok(Some(end));
             }
             run.advance()?;
+            if run.step() < to && !first && run.begins_stage() {
+                // Whatever the schedules, every channel that is on records the first frame of a stage.
+                let what = What::Count {
+                    name: "states of the first step of a stage",
+                    here: 0,
+                    there: 1,
+                };
+                let step = run.step();
+                return Ok(Some(Difference { step, what }));
+            }
             // What is in front of the first recorded state is in another recording.
             if run.step() < to
                 && !first

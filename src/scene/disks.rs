@@ -5,6 +5,7 @@ use crate::minimize::fire::Fire;
 use crate::models::Kind;
 use crate::models::droplet::Form;
 use crate::models::droplet::contact::Rule;
+use crate::state::{Frame, FrameError};
 use std::borrow::Cow;
 
 /// The relaxation of the disks that droplets start from.
@@ -69,6 +70,18 @@ impl Scene {
         } else {
             Cow::Borrowed(self)
         }
+    }
+
+    /// Whether a run of this scene can have a frame with such a stage, memory and box.
+    pub(crate) fn admits(&self, frame: &Frame) -> Result<(), FrameError> {
+        let last = u32::from(self.records_disks());
+        let foreign = [
+            ("a later stage", frame.stage > last),
+            ("a memory", !frame.memory.is_empty()),
+            ("a box of its own", frame.domain.is_some()),
+        ];
+        let found = foreign.into_iter().find(|(_, is)| *is);
+        found.map_or(Ok(()), |(what, _)| Err(FrameError::Foreign { what }))
     }
 
     /// The scene in which the undeformed disks of the start relax.

@@ -8,7 +8,7 @@ use softjam::models::Kind;
 use softjam::models::droplet::Form;
 use softjam::protocol::{RelaxError, Relaxation};
 use softjam::record::{Format, Writer};
-use softjam::replay::{Bytes, Recording, Way, determinism};
+use softjam::replay::{Balance, Bytes, Recording, Way, determinism};
 use softjam::scene::{Channels, Minimizer, Scene, Schedule};
 use softjam::state::{Frame, FrameError};
 use std::fs;
@@ -236,4 +236,50 @@ fn each_stage_has_a_scene_and_disks_alone_no_second() {
         error.to_string().starts_with("disks.record = \"every 2\""),
         "{error}"
     );
+}
+
+#[test]
+fn a_step_limit_ends_the_run_in_either_stage() {
+    let [mut scene, _] = scenes();
+    scene.steps = 25;
+    let last = frames(Relaxation::new(&scene).expect("a valid scene")).pop();
+    assert_eq!(last.map(|f| (f.step, f.stage)), Some((25, 0)));
+    let bytes = record_as(Format::Rrd, &scene, |_| {});
+    let (verdict, balance) = judged(&mut open(&bytes).expect("a recording"), Way::Whole);
+    assert!(verdict.difference.is_none() && balance.agrees());
+}
+
+#[test]
+fn first_state_of_a_stage_must_not_be_missing() {
+    let [scene, _] = scenes();
+    let mut before = 0;
+    let bytes = record_as(Format::Rrd, &scene, |snapshot| {
+        let stage = snapshot.frame.as_ref().map_or(before, |f| f.stage);
+        if stage > before {
+            snapshot.state = false;
+        }
+        before = stage;
+    });
+    let (verdict, _) = judged(&mut open(&bytes).expect("a recording"), Way::Whole);
+    let difference = verdict.difference.expect("a state is missing");
+    assert!(
+        difference.to_string().contains("first step of a stage"),
+        "{difference}"
+    );
+}
+
+#[test]
+fn balance_alone_notices_a_stage_that_no_run_has() {
+    let [scene, _] = scenes();
+    let bytes = record_as(Format::Mcap, &scene, |snapshot| {
+        if let Some(frame) = snapshot.frame.as_mut().filter(|f| f.stage == 1) {
+            frame.stage = 2;
+        }
+    });
+    let mut recording = open(&bytes).expect("a recording");
+    let mut balance = Balance::new(recording.scene());
+    while let Some(state) = recording.next_state().expect("undamaged") {
+        balance.check(&state.packing, &state.frame, &[]);
+    }
+    assert!(!balance.agrees());
 }

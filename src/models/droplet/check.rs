@@ -86,19 +86,22 @@ impl<'a> Contours<'a> {
         }
     }
 
-    /// `ρ_p(θ)` (length).
-    fn radius(&self, p: u32, angle: f64) -> f64 {
+    /// `ρ_p(θ) − R_p` (length).
+    fn bulge(&self, p: u32, angle: f64) -> f64 {
         let pushes = self.pushes[p as usize].iter();
         let bulge: f64 = pushes.map(|(at, f)| f * g(angle - at)).sum();
-        self.packing.radii()[p as usize] * (1.0 + self.per_force * bulge)
+        self.packing.radii()[p as usize] * (self.per_force * bulge)
     }
 
-    /// The gap between two contours on the line of their centres (length).
+    /// The gap between two contours on the line of their centres, from the gap of the disks: where forces are weak nothing is lost to
+    /// the rounding of radii (length).
     fn gap(&self, [i, j]: [u32; 2]) -> f64 {
         let apart = self.packing.separation(i as usize, j as usize);
         let seen_by_i = libm::atan2(-apart.y, -apart.x);
         let seen_by_j = libm::atan2(apart.y, apart.x);
-        apart.norm() - self.radius(i, seen_by_i) - self.radius(j, seen_by_j)
+        let [r_i, r_j] = [i, j].map(|p| self.packing.radii()[p as usize]);
+        let overlap = r_i + r_j - apart.norm();
+        -overlap - self.bulge(i, seen_by_i) - self.bulge(j, seen_by_j)
     }
 
     /// No contour reaches beyond its undeformed circle by more than this (length).

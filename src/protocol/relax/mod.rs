@@ -153,17 +153,10 @@ impl Relaxation {
     pub fn resume(scene: &Scene, mut packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
-        let stages = if scene.records_disks() { 2 } else { 1 };
-        let foreign = [
-            ("a later stage", frame.stage >= stages),
-            ("a memory", !frame.memory.is_empty()),
-            ("a box of its own", frame.domain.is_some()),
-        ];
-        if let Some((what, _)) = foreign.into_iter().find(|(_, is)| *is) {
-            return Err(FrameError::Foreign { what }.into());
-        }
+        scene.admits(&frame)?;
         *packing.positions_mut() = frame.positions;
-        let next = (frame.stage + 1 < stages).then(|| Box::new(scene.clone()));
+        let is_first_of_two = scene.records_disks() && frame.stage == 0;
+        let next = is_first_of_two.then(|| Box::new(scene.clone()));
         let scene = &*scene.stage(frame.stage);
         let mut model = scene.model();
         model.restore(&packing, &frame.contacts, &frame.forces);
@@ -305,8 +298,12 @@ impl Relaxation {
     pub fn status(&self) -> Status {
         if self.failed {
             Status::Failed
-        } else if self.next.is_some() {
-            Status::Running
+        } else if let Some(next) = &self.next {
+            if self.step < next.steps {
+                Status::Running
+            } else {
+                Status::StepLimit
+            }
         } else if self.is_balanced() && !self.is_on_saddle() {
             Status::Converged
         } else if self.step >= self.step_limit {
