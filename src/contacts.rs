@@ -99,6 +99,27 @@ impl FrameContacts {
         contacts
     }
 
+    /// Takes all contacts out.
+    pub(crate) fn clear(&mut self) {
+        self.pairs.clear();
+        self.normals.clear();
+        self.distances.clear();
+        self.overlaps.clear();
+        self.forces.clear();
+    }
+
+    /// Adds a contact, which comes behind the others, along a normal of its own.
+    pub(crate) fn add(
+        &mut self,
+        packing: &Packing,
+        pair: [u32; 2],
+        (normal, distance): (Vec2, f64),
+        force: f64,
+    ) {
+        self.push(packing, pair, normal, distance);
+        self.forces.push(force);
+    }
+
     /// Adds a contact but for its force.
     fn push(&mut self, packing: &Packing, pair: [u32; 2], normal: Vec2, distance: f64) {
         let [i, j] = pair.map(|p| packing.radii()[p as usize]);

@@ -4,8 +4,7 @@ use super::{Backbone, Observables};
 use crate::domain::Vec2;
 use crate::minimize::dt_and_time;
 use crate::models::{AnyModel, Model};
-use crate::state::Frame;
-use crate::state::Packing;
+use crate::state::{Frame, FrameError, Packing};
 
 /// Net forces, torques and observables of a frame, whatever its model: the bits of the run that it comes from.
 ///
@@ -31,7 +30,7 @@ use crate::state::Packing;
 /// let frame = last.unwrap();
 /// let packing = recording.packing(&frame).unwrap();
 /// let scene = recording.scene();
-/// let forces = FrameForces::of(&packing, &frame, scene.model());
+/// let forces = FrameForces::of(&packing, &frame, scene.model()).unwrap();
 /// assert_eq!(forces.net().len(), 32);
 /// assert!(forces.observables().f_max <= scene.threshold);
 /// # std::fs::remove_file(&path).unwrap();
@@ -48,6 +47,10 @@ impl FrameForces {
     /// Of `frame` with the radii and the box of `packing`, whose positions are not looked at; `model` is that of the
     /// scene's [stage](crate::scene::Scene::stage).
     ///
+    /// # Errors
+    ///
+    /// [`FrameError::Foreign`] if no frame of the model has such a memory.
+    ///
     /// # Panics
     ///
     /// If the frame does not [belong](Frame::validate) to the packing.
@@ -57,21 +60,20 @@ impl FrameForces {
     ///
     /// let scene = Scene { particles: 32, phi: 0.9, forces: Form::Gradient, ..Scene::default() };
     /// let run = Relaxation::new(&scene).unwrap();
-    /// let forces = FrameForces::of(run.packing(), &run.frame(), scene.model());
+    /// let forces = FrameForces::of(run.packing(), &run.frame(), scene.model()).unwrap();
     /// assert_eq!(forces.net(), run.net_forces());
     /// assert_eq!(forces.observables(), &run.observables());
     /// ```
-    #[must_use]
-    pub fn of(packing: &Packing, frame: &Frame, mut model: AnyModel) -> Self {
+    pub fn of(packing: &Packing, frame: &Frame, mut model: AnyModel) -> Result<Self, FrameError> {
         let mut packing = packing.clone();
         frame.positions.clone_into(packing.positions_mut());
-        model.restore(&packing, &frame.contacts, &frame.forces);
+        model.restore(&packing, frame)?;
         let (dt, _) = dt_and_time(&frame.minimizer);
-        Self {
+        Ok(Self {
             net: model.net_forces().to_vec(),
             torques: model.torques().to_vec(),
             observables: Observables::of_model(&model, &packing, dt, &mut Backbone::default()),
-        }
+        })
     }
 
     /// The net force `F_i` on each particle (force).

@@ -133,7 +133,16 @@ impl Observables {
         let (gamma, f_max) = (model.line_tension(), model.f_max());
         let AnyModel::MorseWitten(droplets) = model else {
             let contacts = model.contacts(packing);
-            return Self::counted(&contacts, domain, particles, gamma, (f_max, dt), backbone);
+            let o = Self::counted(&contacts, domain, particles, gamma, (f_max, dt), backbone);
+            let AnyModel::Foam(foam) = model else {
+                return o;
+            };
+            let scale = domain.area() * gamma;
+            return Self {
+                energy: foam.energy(),
+                stress: foam.moments().map(|sum| (0.0 - sum) / scale),
+                ..o
+            };
         };
         let law = droplets.law();
         let o = Self::of_law(law, packing, (f_max, dt), backbone);

@@ -176,6 +176,8 @@ pub(crate) fn judge(packing: &Packing, model: &AnyModel) -> Judgement {
             law.restore(packing, contacts.pairs, contacts.forces);
             lowest_of_droplets(packing, &law, droplets.form())
         }
+        // Not yet: its stiffness answers to tilts and areas, too.
+        AnyModel::Foam(_) => None,
         AnyModel::Disks(_) => {
             let compliances = disks::compliances(packing, contacts.pairs, model.line_tension());
             lowest(packing.len(), &contacts, &compliances, |x, y| {

@@ -65,7 +65,8 @@ pub struct SceneFlags {
     #[arg(long, value_name = "STEPS", value_parser = whole, allow_negative_numbers = true, help_heading = RELAXATION)]
     steps: Option<i128>,
 
-    /// Model of the particles: morse-witten (droplets) or disks (undeformed, f = k δ) [default: morse-witten].
+    /// Model of the particles: morse-witten (droplets, linear in the forces), rounded-polygon and wet-foam (droplets that keep their area,
+    /// between straight films and exactly), or disks (undeformed, f = k δ) [default: morse-witten].
     #[arg(long, value_name = "MODEL", value_parser = named::<softjam::models::Kind>, help_heading = PACKING)]
     model: Option<softjam::models::Kind>,
 

@@ -126,7 +126,8 @@ impl Findings {
     fn observables(&self, recording: &Recording) -> Option<Observables> {
         let (packing, last) = self.state(recording)?;
         let model = recording.scene().stage(last.stage).model();
-        Some(*FrameForces::of(&packing, last, model).observables())
+        let forces = FrameForces::of(&packing, last, model).ok()?;
+        Some(*forces.observables())
     }
 
     /// How far the last state strains a linear model.

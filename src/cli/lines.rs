@@ -23,6 +23,8 @@ impl Lines {
         // Droplets are what a packing is of unless it is said.
         let disks = match scene.model {
             Kind::MorseWitten => "",
+            Kind::RoundedPolygon => " rounded polygons",
+            Kind::WetFoam => " droplets of wet foam",
             Kind::Disks => " disks",
         };
         let [x, y] = [domain.lengths().x, domain.lengths().y].map(length);

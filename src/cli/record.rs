@@ -140,7 +140,7 @@ fn relax_and_record(arguments: &Arguments) -> anyhow::Result<Verdict> {
     let model = scene.stage(run.stage()).model;
     let validity = model.validity(&run.contacts(), particles, scene.line_tension);
     if let Some(warning) = validity.and_then(|v| v.warning()) {
-        warn(&warning);
+        warn(&format!("{warning}; --model wet-foam has no such range"));
     }
     Ok(match summary.outcome {
         None => Verdict::Incomplete,

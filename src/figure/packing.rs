@@ -4,8 +4,8 @@ use super::legend::{Legend, length};
 use super::shades::{PALE, Shades};
 use super::shapes::{circle, frame as framed, hundredths, line, page, paper, rectangle};
 use super::{INK, font_size, power_of_ten, with_f_max};
+use crate::analysis::FrameForces;
 use crate::contacts::{Contacts, FrameContacts};
-use crate::contacts::{largest_force, net_forces};
 use crate::domain::{Domain, Vec2};
 use crate::models::Kind;
 use crate::models::droplet::contour::{ContourStyle, Contours, Placement};
@@ -108,16 +108,18 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     let contacts = contacts.view();
     let sheet = Sheet::of(packing.domain(), style.width);
     let radius = mean(packing.radii());
-    let mut contours = scene.model.contours(ContourStyle {
+    let smooth = ContourStyle {
         vertices: vertices(sheet.scale * radius),
         placement: Placement::Contacts,
-    });
+    };
+    let mut contours = scene.model.contours(smooth, line_tension);
+    contours.tell(packing, frame);
     contours.draw(packing.radii(), &frame.positions, &contacts, line_tension);
     // Disks keep their shape.
     let (shape, color) = match (scene.model, style.color) {
-        (Kind::MorseWitten, color) => (style.shape, color),
         (Kind::Disks, ColorBy::Deformation) => (Shape::Disk, ColorBy::Nothing),
         (Kind::Disks, color) => (Shape::Disk, color),
+        (_, color) => (style.shape, color),
     };
     let coloring = (color, style.range);
     let shades = Shades::of(coloring, packing.radii(), frame, &contacts, &contours);
@@ -134,10 +136,12 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
 
     let (x, y, width, height) = sheet.frame();
     let mut legend = Legend::new((x, y + height + 6.0), width, font_size(style.width));
-    let mut pieces = caption(packing, frame, &contacts, line_tension);
+    let mut pieces = caption(packing, frame, scene);
     match (scene.model, shape) {
         (Kind::Disks, _) => pieces.push("disks".to_owned()),
-        (Kind::MorseWitten, Shape::Disk) => pieces.push("undeformed disks".to_owned()),
+        (_, Shape::Disk) => pieces.push("undeformed disks".to_owned()),
+        (Kind::RoundedPolygon, Shape::Contour) => pieces.push("rounded polygons".to_owned()),
+        (Kind::WetFoam, Shape::Contour) => pieces.push("wet foam".to_owned()),
         (Kind::MorseWitten, Shape::Contour) => {}
     }
     legend.lines(&pieces, ", ", 1.0);
@@ -313,15 +317,17 @@ impl Chains {
 }
 
 /// What the picture is of.
-fn caption(packing: &Packing, frame: &Frame, contacts: &Contacts<'_>, unit: f64) -> Vec<String> {
-    let mut net = vec![Vec2::zeros(); packing.len()];
-    net_forces(contacts, &mut net);
-    vec![
+fn caption(packing: &Packing, frame: &Frame, scene: &Scene) -> Vec<String> {
+    let mut caption = vec![
         format!("N = {}", packing.len()),
         format!("φ = {:.3}", packing.coverage()),
         format!("step {}", frame.step),
-        format!("f_max = {} γ", power_of_ten(largest_force(&net) / unit)),
-    ]
+    ];
+    if let Ok(forces) = FrameForces::of(packing, frame, scene.model()) {
+        let f_max = power_of_ten(forces.observables().f_max);
+        caption.push(format!("f_max = {f_max} γ"));
+    }
+    caption
 }
 
 /// Where the box lies on the sheet.

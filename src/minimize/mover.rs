@@ -61,6 +61,12 @@ impl Mover {
         self.state.dt_max
     }
 
+    /// Another upper bound of the time step (time).
+    pub fn set_dt_max(&mut self, dt_max: f64) {
+        self.state.dt_max = dt_max;
+        self.state.dt = self.state.dt.min(dt_max);
+    }
+
     /// Simulated time, the sum of the time steps (time).
     pub fn time(&self) -> f64 {
         self.state.time

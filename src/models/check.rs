@@ -18,7 +18,9 @@ pub struct Check {
     pub pull: f64,
     /// The largest net force (units of γ).
     pub f_max: f64,
-    /// `½ Σ_c δ_c f_c` (γ·length).
+    /// The largest moment of a contact that is not balanced (γ·length); 0 with models that have none.
+    pub moment: f64,
+    /// `½ Σ_c δ_c f_c`, or what the model's energy is (γ·length).
     pub energy: f64,
     /// `(1/2V) Σ_c f_c r_c` (γ/length).
     pub pressure: f64,
@@ -49,6 +51,7 @@ impl Check {
             overlap: over(overlap, scale),
             pull: over(pull, largest(contacts.forces)),
             f_max,
+            moment: 0.0,
             energy: 0.5 * sum(contacts.overlaps) / line_tension,
             pressure: 0.5 * sum(contacts.distances) / (domain.area() * line_tension),
         }

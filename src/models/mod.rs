@@ -27,12 +27,13 @@ pub mod droplet;
 
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
-use crate::state::{Frame, Packing};
+use crate::state::{Frame, FrameError, Packing};
 pub use check::Check;
 use disks::Disks;
 use droplet::MorseWitten;
 use droplet::contact::ContactError;
 use droplet::contour::{ContourStyle, Contours};
+use droplet::foam::{Films, Foam};
 use droplet::validity::Validity;
 
 /// What a model has to give.
@@ -51,13 +52,27 @@ pub trait Model {
 
     /// Takes contacts and forces of a frame as the answer at the positions of `packing`, without solving: the same net
     /// forces, to the last bit, as in the run that the frame is from.
-    fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]);
+    ///
+    /// # Errors
+    ///
+    /// [`FrameError::Foreign`] if the frame has a memory or forces that no frame of the model has.
+    fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError>;
+
+    /// The model's own numbers that the next solution depends on beside the contact forces, in the place of others.
+    fn copy_memory(&self, memory: &mut Vec<f64>) {
+        memory.clear();
+    }
 
     /// The net force on each particle (force).
     fn net_forces(&self) -> &[Vec2];
 
     /// The largest net force (units of γ).
     fn f_max(&self) -> f64;
+
+    /// The largest moment of a contact that its model has still to balance (γ·length).
+    fn moment(&self) -> f64 {
+        0.0
+    }
 
     /// The contacts, in the order of their pairs; `packing` is the one solved last.
     fn contacts<'a>(&'a self, packing: &Packing) -> Contacts<'a>;
@@ -83,6 +98,11 @@ pub trait Model {
     ///
     /// [`ContactError`] if a linear system is not solved.
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError>;
+
+    /// Whether that bound changes so much on the way that it is to be asked for again.
+    fn stiffens(&self) -> bool {
+        false
+    }
 
     /// The residual, relative to its largest `|δ|`, that a frame promises whose balance is asked for to `threshold` (units of γ).
     ///
@@ -132,26 +152,45 @@ pub enum Kind {
     MorseWitten,
     /// Undeformed disks that repel with `f = k δ`: Saitoh 2.2.1.
     Disks,
+    /// Droplets that keep their area, between straight films: [`droplet::foam`].
+    RoundedPolygon,
+    /// Droplets that keep their area, between films that their pressures bend: the exact wet foam, [`droplet::foam`].
+    WetFoam,
 }
 
 impl Kind {
+    /// The films of droplets that keep their area.
+    fn films(self) -> Option<Films> {
+        match self {
+            Self::RoundedPolygon => Some(Films::Straight),
+            Self::WetFoam => Some(Films::Arcs),
+            Self::MorseWitten | Self::Disks => None,
+        }
+    }
+
+    /// Whether frames of the model have a memory.
+    pub(crate) fn has_memory(self) -> bool {
+        self.films().is_some()
+    }
+
     /// The name in scenes.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::MorseWitten => "morse-witten",
             Self::Disks => "disks",
+            Self::RoundedPolygon => "rounded-polygon",
+            Self::WetFoam => "wet-foam",
         }
     }
-}
 
-impl Kind {
     /// The contours that particles of this model have: those of disks stay circles.
     #[must_use]
-    pub fn contours(self, style: ContourStyle) -> Contours {
-        match self {
-            Self::MorseWitten => Contours::new(style),
-            Self::Disks => Contours::circles(style),
+    pub fn contours(self, style: ContourStyle, line_tension: f64) -> Contours {
+        match (self, self.films()) {
+            (_, Some(films)) => Contours::of_foam(style, Foam::new(films, line_tension, 0.0)),
+            (Self::Disks, None) => Contours::circles(style),
+            (_, None) => Contours::new(style),
         }
     }
 
@@ -176,6 +215,8 @@ pub enum AnyModel {
     MorseWitten(Box<MorseWitten>),
     /// Undeformed disks.
     Disks(Box<Disks>),
+    /// Droplets that keep their area.
+    Foam(Box<Foam>),
 }
 
 macro_rules! each {
@@ -183,6 +224,7 @@ macro_rules! each {
         match $self {
             Self::MorseWitten($model) => $call,
             Self::Disks($model) => $call,
+            Self::Foam($model) => $call,
         }
     };
 }
@@ -196,8 +238,20 @@ impl Model for AnyModel {
         each!(self, model => model.solve(packing, goal))
     }
 
-    fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        each!(self, model => model.restore(packing, pairs, forces));
+    fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError> {
+        each!(self, model => model.restore(packing, frame))
+    }
+
+    fn copy_memory(&self, memory: &mut Vec<f64>) {
+        each!(self, model => model.copy_memory(memory));
+    }
+
+    fn moment(&self) -> f64 {
+        each!(self, model => model.moment())
+    }
+
+    fn stiffens(&self) -> bool {
+        each!(self, model => model.stiffens())
     }
 
     fn net_forces(&self) -> &[Vec2] {

@@ -123,6 +123,32 @@ fn start(scene: &Scene, seed: &str) -> String {
     }
 }
 
+/// A model in words, what its particles are called, and what φ is of them.
+fn described(model: Kind) -> (&'static str, &'static str, &'static str) {
+    match model {
+        Kind::MorseWitten => (
+            "Morse–Witten model",
+            "deformable particle",
+            ", the coverage of their undeformed disks",
+        ),
+        Kind::RoundedPolygon => (
+            "Rounded polygons: droplets that keep their area, between straight films",
+            "droplet",
+            ", the coverage of their undeformed disks",
+        ),
+        Kind::WetFoam => (
+            "Wet foam: droplets that keep their area, between films that their pressures bend",
+            "droplet",
+            ", the coverage of their undeformed disks",
+        ),
+        Kind::Disks => (
+            "Undeformed disks, f = k δ with k = 4πγ / 3(R_i + R_j)",
+            "disk",
+            "",
+        ),
+    }
+}
+
 /// What a person who opens the recording reads beside the pictures.
 fn text(header: &Header) -> String {
     let (scene, packing) = (&header.scene, &header.packing);
@@ -139,18 +165,7 @@ fn text(header: &Header) -> String {
             }
         ),
     };
-    let (model, particle, coverage) = match scene.model {
-        Kind::MorseWitten => (
-            "Morse–Witten model",
-            "deformable particle",
-            ", the coverage of their undeformed disks",
-        ),
-        Kind::Disks => (
-            "Undeformed disks, f = k δ with k = 4πγ / 3(R_i + R_j)",
-            "disk",
-            "",
-        ),
-    };
+    let (model, particle, coverage) = described(scene.model);
     let disks = if scene.records_disks() {
         format!(
             " Its first stage are the undeformed disks, to f_max ≤ {:e} γ.",
@@ -194,6 +209,11 @@ fn text(header: &Header) -> String {
     }
     if channels.contours.is_on() {
         let [outline, dent, disks] = match scene.model {
+            Kind::RoundedPolygon | Kind::WetFoam => [
+                "contour of a droplet",
+                ", deepest dent (length)",
+                "| `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n",
+            ],
             Kind::MorseWitten => [
                 "contour ρ(θ) of a particle",
                 ", deepest dent −ΔR/R",

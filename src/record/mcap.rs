@@ -175,7 +175,7 @@ impl<W: Write> McapRecorder<W> {
             let contacts = contacts.view();
             if let Some(particles) = particles {
                 let radii = self.packing.radii();
-                let contours = self.contours.at(frame.stage);
+                let contours = self.contours.at(&self.packing, frame);
                 contours.draw(radii, &frame.positions, &contacts, self.line_tension);
                 let colors = particles.colors();
                 let lines = contour_lines(step, contours, &colors);

@@ -5,7 +5,7 @@ use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contour::Contours;
 use crate::scene::Scene;
-use crate::state::Frame;
+use crate::state::{Frame, Packing};
 use core::f64::consts::PI;
 use std::sync::LazyLock;
 
@@ -30,16 +30,18 @@ impl StageContours {
         Self {
             scene: scene.clone(),
             stage: 0,
-            contours: scene.stage(0).model.contours(scene.contours),
+            contours: (scene.stage(0).model).contours(scene.contours, scene.line_tension),
         }
     }
 
-    /// Those of a stage.
-    pub fn at(&mut self, stage: u32) -> &mut Contours {
-        if stage != self.stage {
-            let scene = self.scene.stage(stage);
-            (self.stage, self.contours) = (stage, scene.model.contours(scene.contours));
+    /// Those for `frame`, with the radii and the box of `packing`.
+    pub fn at(&mut self, packing: &Packing, frame: &Frame) -> &mut Contours {
+        if frame.stage != self.stage {
+            let scene = self.scene.stage(frame.stage);
+            let contours = scene.model.contours(scene.contours, scene.line_tension);
+            (self.stage, self.contours) = (frame.stage, contours);
         }
+        self.contours.tell(packing, frame);
         &mut self.contours
     }
 }

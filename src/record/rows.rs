@@ -162,7 +162,7 @@ impl Rows {
         } = &mut self.pending;
         let line_tension = self.line_tension;
         let drawing = (
-            self.contours.at(frame.stage),
+            self.contours.at(&self.packing, frame),
             radii,
             frame,
             contacts,

@@ -75,9 +75,10 @@ impl Scene {
     /// Whether a run of this scene can have a frame with such a stage, memory and box.
     pub(crate) fn admits(&self, frame: &Frame) -> Result<(), FrameError> {
         let last = u32::from(self.records_disks());
+        let model = self.stage(frame.stage).model;
         let foreign = [
             ("a later stage", frame.stage > last),
-            ("a memory", !frame.memory.is_empty()),
+            ("a memory", !frame.memory.is_empty() && !model.has_memory()),
             ("a box of its own", frame.domain.is_some()),
         ];
         let found = foreign.into_iter().find(|(_, is)| *is);

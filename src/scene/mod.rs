@@ -33,6 +33,7 @@ use crate::models::disks::Disks;
 use crate::models::droplet::contact::solver::Method;
 use crate::models::droplet::contact::{ContactLaw, Rule};
 use crate::models::droplet::contour::ContourStyle;
+use crate::models::droplet::foam::{Films, Foam};
 use crate::models::droplet::{Form, MorseWitten};
 use crate::models::{AnyModel, Kind};
 use crate::text::{lines, shown};
@@ -390,10 +391,17 @@ impl Scene {
     pub fn model(&self) -> AnyModel {
         match self.model {
             Kind::Disks => AnyModel::Disks(Box::new(Disks::new(self.line_tension))),
+            Kind::RoundedPolygon => self.foam(Films::Straight),
+            Kind::WetFoam => self.foam(Films::Arcs),
             Kind::MorseWitten => {
                 AnyModel::MorseWitten(Box::new(MorseWitten::new(self.contact_law(), self.forces)))
             }
         }
+    }
+
+    fn foam(&self, films: Films) -> AnyModel {
+        let foam = Foam::new(films, self.line_tension, self.contact_tolerance);
+        AnyModel::Foam(Box::new(foam))
     }
 
     /// The contact law of droplets that the scene asks for.

@@ -39,7 +39,7 @@ impl Scene {
 
     fn write_model(&self, page: &mut Page) {
         page.field(
-            "Model: \"morse-witten\" (droplets) or \"disks\" (undeformed, f = k delta).",
+            "Model: \"morse-witten\" (droplets, linear in the forces), \"rounded-polygon\" and \"wet-foam\" (droplets that keep their area, between\n# straight films and exactly), or \"disks\" (undeformed, f = k delta).",
             "model",
             value(&self.model),
         );
@@ -132,7 +132,9 @@ impl Scene {
         }
         page.field(
             match self.model {
-                Kind::MorseWitten => "Line tension gamma of the contours, > 0.",
+                Kind::MorseWitten | Kind::RoundedPolygon | Kind::WetFoam => {
+                    "Line tension gamma of the contours, > 0."
+                }
                 Kind::Disks => "Unit of force gamma, > 0: k = 4 pi gamma / 3 (R_i + R_j).",
             },
             "line_tension",
@@ -181,8 +183,15 @@ impl Scene {
             "contact_solver",
             value(&self.contact_solver),
         );
+        }
+        if self.model != Kind::Disks {
             page.field(
-                "Residual of A f = delta relative to the largest overlap, 1e-14 … 1e-6.",
+                match self.model {
+                    Kind::MorseWitten => {
+                        "Residual of A f = delta relative to the largest overlap, 1e-14 … 1e-6."
+                    }
+                    _ => "Violation of the contact law relative to the largest overlap, 1e-14 … 1e-6.",
+                },
                 "contact_tolerance",
                 number(self.contact_tolerance),
             );
@@ -213,6 +222,7 @@ impl Scene {
     fn write_recording(&self, page: &mut Page) {
         page.text(match self.model {
             Kind::MorseWitten => "\n# Polygons: vertices equally spaced in angle, 3 … 4096; placement \"contacts\" puts one more on each contact,\n# \"equal\" does not (and cuts the cusps off).\n[contours]",
+            Kind::RoundedPolygon | Kind::WetFoam => "\n# Polygons: vertices of a turn along arcs, 3 … 4096, beside both ends of each film; placement is of no use to them.\n[contours]",
             Kind::Disks => "\n# Polygons: vertices of a circle, 3 … 4096; placement is of no use to disks.\n[contours]",
         });
         page.line("vertices", self.contours.vertices);

@@ -68,20 +68,21 @@ impl Scene {
         ];
         let record = self.disks.record.to_string();
         let (field, value, why) = match self.model {
-            Kind::Disks if newton => (
+            Kind::MorseWitten => return Ok(()),
+            _ if newton => (
                 "minimizer",
                 "fire+newton",
-                "Newton's method solves for contact forces that disks do not have; take fire",
+                "Newton's method solves for the contact forces of Morse and Witten's droplets; take fire",
             ),
-            Kind::Disks if turning => (
+            _ if turning => (
                 "forces",
                 "gradient",
-                "disks have central forces alone, which are the gradient of their energy",
+                "its forces are the gradient of its energy as they are; leave it out",
             ),
-            Kind::Disks if saitoh => (
+            _ if saitoh => (
                 "contact_rule",
                 "saitoh",
-                "disks touch where they overlap; leave it out",
+                "its contacts follow the positions in every step; leave it out",
             ),
             Kind::Disks if relaxed => (
                 "disks.relax",
@@ -93,12 +94,12 @@ impl Scene {
                 record.as_str(),
                 "the run itself is of disks, which [channels] schedules; leave it out",
             ),
-            _ => return Ok(()),
+            Kind::Disks | Kind::RoundedPolygon | Kind::WetFoam => return Ok(()),
         };
         Err(SceneError::Conflict {
             field: field.into(),
             value: format!("\"{value}\""),
-            with: "model = \"disks\"".into(),
+            with: format!("model = \"{}\"", self.model.name()),
             why: why.into(),
         })
     }

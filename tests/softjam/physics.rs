@@ -7,6 +7,7 @@ mod balance;
 mod contact_law;
 mod crystal;
 mod edge_cases;
+mod foam;
 mod golden;
 mod gradient;
 mod matrix;

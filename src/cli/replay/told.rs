@@ -15,6 +15,7 @@ impl Findings {
         let (mut checked, mut not) = (Vec::new(), Vec::new());
         let (law, shapes) = match self.recording.scene().model {
             Kind::MorseWitten => ("contact law", "contours"),
+            Kind::RoundedPolygon | Kind::WetFoam => ("contact law and the areas", "contours"),
             Kind::Disks => ("law of the forces", "disks"),
         };
         match &self.determinism {
@@ -202,6 +203,7 @@ pub(super) fn tell_balance(b: &Balance, model: Kind, lines: &mut Lines) {
     };
     let law = match model {
         Kind::MorseWitten => "equation (4)",
+        Kind::RoundedPolygon | Kind::WetFoam => "contact law",
         Kind::Disks => "f = k δ",
     };
     let (last, worst) = (b.last_equation_4, at(&b.equation_4));

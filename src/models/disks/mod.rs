@@ -25,7 +25,7 @@ use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
 use crate::models::droplet::contact::ContactError;
 use crate::neighbors::NeighborList;
-use crate::state::{Frame, Packing};
+use crate::state::{Frame, FrameError, Packing};
 use core::f64::consts::PI;
 use forces::Candidates;
 use std::sync::OnceLock;
@@ -116,9 +116,10 @@ impl Model for Disks {
     }
 
     /// Forces follow from the positions alone.
-    fn restore(&mut self, packing: &Packing, _: &[[u32; 2]], _: &[f64]) {
+    fn restore(&mut self, packing: &Packing, _: &Frame) -> Result<(), FrameError> {
         // Disks have an answer at any positions.
         let _: Result<(), ContactError> = self.solve(packing, Goal::EXACT);
+        Ok(())
     }
 
     fn net_forces(&self) -> &[Vec2] {

@@ -18,12 +18,15 @@
 //! Near a contact the notches of the two particles overlap in a thin lens of half-width `f R_eff/γ` and depth
 //! `f² R_eff/4γ²`, `R_eff = 2 R_i R_j/(R_i + R_j)`: that is what the linear model says, and it is drawn as it is.
 
+use super::foam::Foam;
 use super::kernel::{Angles, Direction};
 use super::outline::{Circle, Outline};
 pub(crate) use super::outline::{Extent, Stretch};
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
+use crate::models::Model;
 use crate::numerics::wide::wide;
+use crate::state::{Frame, Packing};
 use core::f64::consts::PI;
 
 /// How a contour becomes a polygon.
@@ -104,6 +107,8 @@ pub struct Contours {
     evaluations: u64,
     /// Whether forces are passed over.
     circles: bool,
+    /// Droplets that keep their area.
+    foam: Option<Box<Foam>>,
 }
 
 impl Contours {
@@ -133,6 +138,24 @@ impl Contours {
             nodes: Vec::new(),
             evaluations: 0,
             circles: false,
+            foam: None,
+        }
+    }
+
+    /// Contours of droplets that keep their area, each of which is [told](Self::tell) its frame before it is drawn.
+    pub(crate) fn of_foam(style: ContourStyle, foam: Foam) -> Self {
+        Self {
+            foam: Some(Box::new(foam)),
+            ..Self::new(style)
+        }
+    }
+
+    /// What is drawn next is `frame`, with the radii and the box of `packing`. Droplets with forces that none can bear are drawn as circles.
+    pub fn tell(&mut self, packing: &Packing, frame: &Frame) {
+        if let Some(foam) = &mut self.foam {
+            let mut at = packing.clone();
+            frame.positions.clone_into(at.positions_mut());
+            self.circles = foam.restore(&at, frame).is_err();
         }
     }
 
@@ -181,6 +204,10 @@ impl Contours {
         mut drawn: impl FnMut(&mut Vec<V>, usize, Extent),
     ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
+        if let Some(foam) = self.foam.as_ref().filter(|_| !self.circles) {
+            self.evaluations += foam.trace(radii, positions, self.style.vertices, vertices, drawn);
+            return;
+        }
         if self.circles {
             self.gather(radii.len(), &FrameContacts::default().view());
         } else {

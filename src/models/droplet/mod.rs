@@ -56,6 +56,7 @@ mod angle;
 mod check;
 pub mod contact;
 pub mod contour;
+pub mod foam;
 mod form;
 pub mod frequency;
 pub mod kernel;

@@ -6,7 +6,7 @@ use super::frequency::largest_frequency;
 use crate::contacts::{Contacts, largest_force};
 use crate::domain::Vec2;
 use crate::models::{Check, Goal, Model};
-use crate::state::{Frame, Packing};
+use crate::state::{Frame, FrameError, Packing};
 
 /// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Geometric means of the steps
 /// with 1.0, 1.2 and 1.3 (the first with α_start = 0.25, the others with 0.1), N = 1024: 3184, 2654, 2573 at φ = 0.86 (96 seeds);
@@ -96,9 +96,10 @@ impl Model for MorseWitten {
         Ok(())
     }
 
-    fn restore(&mut self, packing: &Packing, pairs: &[[u32; 2]], forces: &[f64]) {
-        self.law.restore(packing, pairs, forces);
+    fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError> {
+        self.law.restore(packing, &frame.contacts, &frame.forces);
         self.balance(packing);
+        Ok(())
     }
 
     fn net_forces(&self) -> &[Vec2] {

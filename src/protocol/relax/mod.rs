@@ -16,6 +16,9 @@ use crate::scene::{Minimizer, Scene, start};
 use crate::state::{Frame, FrameError, Packing};
 use std::sync::OnceLock;
 
+/// Steps after which the bound of the time step is found anew where a model stiffens.
+const STIFFENS: u64 = 50;
+
 /// A packing on its way to mechanical equilibrium.
 ///
 /// # Example
@@ -37,6 +40,8 @@ pub struct Relaxation {
     velocities: Vec<Vec2>,
     model: AnyModel,
     mover: Mover,
+    /// The bound of the time step that the scene gives (time).
+    dt_max: Option<f64>,
     step: u64,
     threshold: f64,
     step_limit: u64,
@@ -128,6 +133,7 @@ impl Relaxation {
         Self {
             packing,
             velocities,
+            dt_max: scene.dt_max,
             model,
             mover,
             step,
@@ -150,16 +156,20 @@ impl Relaxation {
     /// # Errors
     ///
     /// [`RelaxError::Frame`] if the frame does not fit the packing, otherwise as [`new`](Self::new).
-    pub fn resume(scene: &Scene, mut packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
+    pub fn resume(
+        scene: &Scene,
+        mut packing: Packing,
+        mut frame: Frame,
+    ) -> Result<Self, RelaxError> {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
         scene.admits(&frame)?;
-        *packing.positions_mut() = frame.positions;
+        *packing.positions_mut() = core::mem::take(&mut frame.positions);
         let is_first_of_two = scene.records_disks() && frame.stage == 0;
         let next = is_first_of_two.then(|| Box::new(scene.clone()));
         let scene = &*scene.stage(frame.stage);
         let mut model = scene.model();
-        model.restore(&packing, &frame.contacts, &frame.forces);
+        model.restore(&packing, &frame)?;
         let mover = Mover::resume(scene.fire, finishes(scene), &frame.minimizer).ok_or(
             FrameError::Minimizer {
                 minimizer: frame.minimizer.name(),
@@ -265,7 +275,16 @@ impl Relaxation {
             threshold: self.threshold,
             moved,
         };
-        self.model.solve(&self.packing, goal).map_err(|source| {
+        let solved = self.model.solve(&self.packing, goal);
+        let solved = solved.and_then(|()| {
+            let follows = self.dt_max.is_none() && self.model.stiffens();
+            if follows && step.is_multiple_of(STIFFENS) {
+                let dt_max = self.model.longest_time_step(&self.packing)?;
+                self.mover.set_dt_max(dt_max);
+            }
+            Ok(())
+        });
+        solved.map_err(|source| {
             self.failed = true;
             RelaxError::Contact { step, source }
         })
@@ -278,9 +297,11 @@ impl Relaxation {
         self.model.promised_residual(&self.packing, self.threshold)
     }
 
-    /// Whether `f_max` is not above the threshold, and the contact law is fulfilled.
+    /// Whether `f_max` is not above the threshold, nor a moment (γ·length), and the contact law is fulfilled.
     fn is_balanced(&self) -> bool {
-        self.f_max() <= self.threshold && self.model.residual() <= self.model.accepted_residual()
+        self.f_max() <= self.threshold
+            && self.model.moment() <= self.threshold
+            && self.model.residual() <= self.model.accepted_residual()
     }
 
     /// Whether a frame in balance is a minimum or a saddle; `None` while it is not in balance.

@@ -28,8 +28,8 @@ impl Relaxation {
         let (pairs, forces) = (&mut frame.contacts, &mut frame.forces);
         self.model.copy_contacts(&self.packing, pairs, forces);
         frame.minimizer = self.mover.numbers();
-        // No model of today has memory, and no protocol changes the box.
-        frame.memory.clear();
+        self.model.copy_memory(&mut frame.memory);
+        // No protocol of today changes the box.
         (frame.domain, frame.stage) = (None, self.stage);
     }
 
@@ -112,7 +112,7 @@ impl Relaxation {
     pub fn law(&self) -> Option<&ContactLaw> {
         match &self.model {
             AnyModel::MorseWitten(droplets) => Some(droplets.law()),
-            AnyModel::Disks(_) => None,
+            AnyModel::Disks(_) | AnyModel::Foam(_) => None,
         }
     }
 

@@ -329,7 +329,7 @@ fn forces_and_stress_of_a_frame_are_those_of_the_run_it_comes_from() {
         let mut torques = 0;
         loop {
             let frame = run.frame();
-            let found = FrameForces::of(run.packing(), &frame, scene.model());
+            let found = FrameForces::of(run.packing(), &frame, scene.model()).unwrap();
             assert_eq!(found.net(), run.net_forces(), "step {}", frame.step);
             assert_eq!(
                 *found.observables(),

@@ -51,6 +51,20 @@ pub enum ContactError {
         /// Its undeformed radius (length).
         radius: f64,
     },
+    /// There is no room for a droplet that keeps its area.
+    #[error(
+        "droplets {particle} and {other} have no room for their areas (they press on each other with {force:.3e} γ): a cell became smaller than \
+         its droplet, as after a step that was too long or in a start that overlaps far too much; start from relaxed disks (--relax-disks \
+         for a file), or take a lower phi"
+    )]
+    NoRoom {
+        /// A droplet.
+        particle: usize,
+        /// The one that it presses on most.
+        other: usize,
+        /// Their force (units of γ).
+        force: f64,
+    },
     /// Exchanging contacts did not end. Only round-off can bring this about, at an exact tie.
     #[error(
         "the contact set did not settle: {violating} of {} still break the contact law after {}", counted(.contacts, "pair"), counted(.sweeps, "sweep")

@@ -1,0 +1,449 @@
+//! Droplets whose area is kept exactly: rounded polygons, right to one per cent of wet foam, and the wet foam itself.
+//!
+//! Three laws share Morse and Witten's kernel, and differ in little. A droplet of radius `R` under forces `f` has free arcs of the *corner
+//! radius* `r`, and
+//!
+//! ```text
+//! Morse–Witten        r = R           linear in the forces: 10 % off where Σf/2πγ is 0.066
+//! rounded polygons    r = R/√Y        straight films, C = 0: the area πR² is kept, balanced droplets are exact polygons with round corners
+//! wet foam            𝓛_r = 0         films are arcs, C(f, r_i, r_j): nothing is left out
+//! ```
+//!
+//! with `Y` and `𝓛` as in `state`. A contact pushes along the normal of its chord, which is the line of centres turned by a *tilt* `τ`: so that
+//! both droplets have the chord's midpoint in one place. Then the net force is `−∂U/∂x`, each droplet's torque vanishes, and balance of forces is
+//! balance of everything.
+//!
+//! For straight films forces and contact set are unique at given positions and tilts (Brunn–Minkowski). For arcs, and for the tilts, that was
+//! found wherever it was looked for, and is not proved.
+//!
+//! ```
+//! use softjam::models::Kind;
+//! use softjam::protocol::{Relaxation, Status};
+//! use softjam::scene::Scene;
+//!
+//! let scene = Scene { particles: 64, phi: 0.92, model: Kind::WetFoam, ..Scene::default() };
+//! let mut run = Relaxation::new(&scene).unwrap();
+//! while run.status() == Status::Running {
+//!     run.advance().unwrap();
+//! }
+//! assert_eq!(run.status(), Status::Converged);
+//! // The stress is that of wet foam, where the linear model falls short by a quarter.
+//! assert!(run.observables().pressure() > 0.3);
+//! ```
+
+mod check;
+mod contact_problem;
+mod film;
+mod lines;
+mod outline;
+mod state;
+#[cfg(test)]
+mod tests;
+mod tilts;
+
+pub use state::Films;
+
+use super::contact::{ACCEPTED, ContactError, due_tolerance};
+use crate::contacts::{Contacts, FrameContacts, largest_force};
+use crate::domain::Vec2;
+use crate::models::{Check, Goal, Model};
+use crate::neighbors::NeighborList;
+use crate::state::{Frame, FrameError, Packing};
+use contact_problem::{Steps, violation};
+use lines::{Lines, REACH};
+use state::State;
+
+/// How soft contacts are made where droplets have no room (largest radii a γ), how often that is doubled, and the `f_max` (units of γ) below which
+/// they are made hard again.
+const SOFT: f64 = 0.05;
+const SOFTER: usize = 12;
+const HARDENS: f64 = 1e-2;
+
+/// Sweeps over all tilts that a start may take; each takes a contact problem.
+const SWEEPS: usize = 200;
+
+/// `dt_max √(2 k)`, `k` the largest sum of the stiffnesses of a droplet's contacts.
+const DT_MAX: f64 = 1.3;
+
+/// Droplets that keep their area, by straight films or by arcs.
+///
+/// See the example of the [module](self).
+#[derive(Clone, Debug)]
+pub struct Foam {
+    films: Films,
+    /// γ (force).
+    line_tension: f64,
+    /// Violation of the contact law to which it is solved in balance, relative to the largest `|δ|`.
+    tolerance: f64,
+    near: NeighborList,
+    lines: Lines,
+    /// Tilt (radians) and force of each line.
+    tilts: Vec<f64>,
+    forces: Vec<f64>,
+    state: State,
+    steps: Steps,
+    contacts: FrameContacts,
+    net: Vec<Vec2>,
+    /// The largest net force (units of γ).
+    f_max: f64,
+}
+
+impl Foam {
+    /// Droplets of line tension γ (force) with such films, whose contact law is solved to `tolerance` (relative to the largest `|δ|`) in balance.
+    #[must_use]
+    pub fn new(films: Films, line_tension: f64, tolerance: f64) -> Self {
+        Self {
+            films,
+            line_tension,
+            tolerance,
+            near: NeighborList::new(),
+            lines: Lines::default(),
+            tilts: Vec::new(),
+            forces: Vec::new(),
+            state: State::default(),
+            steps: Steps::default(),
+            contacts: FrameContacts::default(),
+            net: Vec::new(),
+            f_max: 0.0,
+        }
+    }
+
+    /// What the films are.
+    #[must_use]
+    pub fn films(&self) -> Films {
+        self.films
+    }
+
+    /// `Σ perimeter − 2πR`, in balance: the energy (γ·length).
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.state.lagrangian()
+    }
+
+    /// The corner radius `r` of each droplet, whose pressure is `γ/r` (length).
+    #[must_use]
+    pub fn corners(&self) -> &[f64] {
+        self.state.corners()
+    }
+
+    /// `Σ_c f_c n_c⊗Δx_c` as xx, xy, yy (force·length), which is symmetric where moments vanish and is made so elsewhere.
+    #[must_use]
+    pub fn moments(&self) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for (c, f) in self.forces.iter().enumerate().filter(|(_, f)| **f > 0.0) {
+            let (n, between) = (self.lines.normals()[c], self.lines.between(c));
+            sums[0] += f * n.x * between.x;
+            sums[1] += 0.5 * f * (n.x * between.y + n.y * between.x);
+            sums[2] += f * n.y * between.y;
+        }
+        sums
+    }
+
+    /// The lines at new positions; what was known of a pair stays with it.
+    fn set_lines(&mut self, packing: &Packing) {
+        let margin = 2.0 * (REACH - 1.0) * packing.largest_radius();
+        self.near
+            .update(packing, margin, 0.1 * packing.largest_radius());
+        let before = self.lines.pairs().to_vec();
+        let known = [&self.tilts, &self.forces].map(Vec::clone);
+        self.lines.set(packing, self.near.pairs());
+        let mut next = 0;
+        self.tilts.clear();
+        self.forces.clear();
+        for pair in self.lines.pairs() {
+            while before.get(next).is_some_and(|old| old < pair) {
+                next += 1;
+            }
+            let same = before.get(next) == Some(pair);
+            let [tilt, force] = known.each_ref().map(|v| if same { v[next] } else { 0.0 });
+            self.tilts.push(tilt);
+            self.forces.push(force);
+        }
+    }
+
+    /// Forces at the lines and tilts at hand, to `tolerance` (length); soft ones where droplets have no room.
+    fn find_forces(&mut self, packing: &Packing, tolerance: f64) -> Result<(), ContactError> {
+        self.lines.turn(&self.tilts);
+        let given = (&self.lines, packing.radii());
+        for _ in 0..=SOFTER {
+            let forces = (&mut self.forces[..], self.line_tension);
+            if self
+                .steps
+                .solve(given, &mut self.state, forces, self.films, tolerance)
+            {
+                return Ok(());
+            }
+            let give = (2.0 * self.state.give()).max(SOFT * packing.largest_radius());
+            self.state.set_give(give);
+        }
+        let loads = self.forces.iter().map(|f| f / self.line_tension);
+        let (line, strongest) =
+            (0..).zip(loads).fold(
+                (0, 0.0),
+                |most, (c, f)| if f > most.1 { (c, f) } else { most },
+            );
+        let [particle, other] =
+            (self.lines.pairs().get(line as usize)).map_or([0, 0], |p| p.map(|p| p as usize));
+        Err(ContactError::NoRoom {
+            particle,
+            other,
+            force: strongest,
+        })
+    }
+
+    /// Contacts and net forces of the answer at hand.
+    fn balance(&mut self, packing: &Packing) {
+        self.contacts.clear();
+        self.net.clear();
+        self.net.resize(packing.len(), Vec2::zeros());
+        for (c, &pair) in self.lines.pairs().iter().enumerate() {
+            let f = self.forces[c];
+            if f > 0.0 {
+                let normal = -self.lines.normals()[c];
+                let place = (normal, self.lines.distances()[c]);
+                self.contacts.add(packing, pair, place, f);
+                self.net[pair[0] as usize] += normal * f;
+                self.net[pair[1] as usize] -= normal * f;
+            }
+        }
+        self.f_max = largest_force(&self.net) / self.line_tension;
+    }
+
+    /// The largest `|δ|` among contacts (length), or among overlapping pairs where there is none yet.
+    fn scale(&self, packing: &Packing) -> f64 {
+        let largest = |m: f64, d: f64| m.max(d.abs());
+        let overlaps = self.contacts.view().overlaps;
+        if !overlaps.is_empty() {
+            return overlaps.iter().copied().fold(0.0, largest);
+        }
+        let radii = packing.radii();
+        let depths = self.lines.pairs().iter().zip(self.lines.distances());
+        depths
+            .map(|([i, j], d)| radii[*i as usize] + radii[*j as usize] - d)
+            .filter(|depth| *depth > 0.0)
+            .fold(0.0, largest)
+    }
+
+    /// The violation that is due at an `f_max` (length).
+    fn due(&self, packing: &Packing, f_max: f64) -> f64 {
+        let scale = self.scale(packing).max(1e-9 * packing.smallest_radius());
+        scale * due_tolerance(packing, &[scale], f_max, self.tolerance)
+    }
+
+    /// Forces and tilts together, from those at hand: a sweep over the tilts after each contact problem, until no midpoints are apart.
+    fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
+        self.set_lines(packing);
+        for sweep in 0..SWEEPS {
+            if sweep > 0 {
+                tilts::step(&self.lines, &self.state, &mut self.tilts);
+            }
+            let tolerance = self.due(packing, 0.0);
+            self.find_forces(packing, tolerance)?;
+            self.balance(packing);
+            if self.midpoints_apart() <= tolerance {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The largest `|T|` (length).
+    fn midpoints_apart(&self) -> f64 {
+        let arms = (0..self.lines.len()).map(|c| self.state.moment_arm(&self.lines, c).abs());
+        arms.fold(0.0, f64::max)
+    }
+}
+
+impl Model for Foam {
+    fn line_tension(&self) -> f64 {
+        self.line_tension
+    }
+
+    /// Far from balance the tilts make one step between two contact problems. Where no frame is at hand, or the goal is
+    /// [`Goal::EXACT`], they are solved for.
+    fn solve(&mut self, packing: &Packing, goal: Goal) -> Result<(), ContactError> {
+        if goal == Goal::EXACT || self.net.len() != packing.len() {
+            return self.settle(packing);
+        }
+        tilts::step(&self.lines, &self.state, &mut self.tilts);
+        self.set_lines(packing);
+        if goal.f_max < HARDENS {
+            self.state.set_give(0.0);
+        }
+        let mut due = goal.due(goal.f_max);
+        loop {
+            let tolerance = self.due(packing, due);
+            self.find_forces(packing, tolerance)?;
+            self.balance(packing);
+            let now = goal.due(self.f_max);
+            if due == 0.0
+                || (now > 0.0 && self.residual() <= self.promised_residual(packing, goal.threshold))
+            {
+                return Ok(());
+            }
+            due = if self.f_max < due {
+                goal.due(0.5 * self.f_max)
+            } else {
+                0.0
+            };
+        }
+    }
+
+    fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError> {
+        const MEMORY: FrameError = FrameError::Foreign {
+            what: "a memory that is not that of its droplets",
+        };
+        self.set_lines(packing);
+        let lines = self.lines.len();
+        let dents = match self.films {
+            Films::Straight => 0,
+            Films::Arcs => packing.len(),
+        };
+        let parts = frame.memory.split_at_checked(lines);
+        let parts = parts.and_then(|(tilts, rest)| Some((tilts, rest.split_at_checked(dents)?)));
+        let Some((tilts, (dents, give))) = parts else {
+            return Err(MEMORY);
+        };
+        let give = match give {
+            [] => 0.0,
+            [give] if *give > 0.0 && give.is_finite() => *give,
+            _ => return Err(MEMORY),
+        };
+        let possible = tilts.iter().all(|tilt| tilt.abs() < 1.0);
+        let mut sensible = dents.iter().zip(packing.radii());
+        if !possible || !sensible.all(|(d, radius)| *d < *radius && *d > -10.0 * radius) {
+            return Err(MEMORY);
+        }
+        tilts.clone_into(&mut self.tilts);
+        self.state.set_dents(dents);
+        self.state.set_give(give);
+        self.forces.fill(0.0);
+        let mut contacts = frame.contacts.iter().zip(&frame.forces).peekable();
+        for (pair, force) in self.lines.pairs().iter().zip(&mut self.forces) {
+            if let Some((_, f)) = contacts.next_if(|(of, _)| *of == pair) {
+                *force = *f;
+            }
+        }
+        self.lines.turn(&self.tilts);
+        let given = (&self.lines, packing.radii());
+        let forces = (&self.forces[..], self.line_tension);
+        let holds = contacts.next().is_none() && frame.forces.iter().all(|f| *f > 0.0);
+        if !holds
+            || !self
+                .state
+                .evaluate(given, forces, self.films, f64::INFINITY)
+        {
+            return Err(FrameError::Foreign {
+                what: "forces that no droplets can bear",
+            });
+        }
+        self.balance(packing);
+        Ok(())
+    }
+
+    fn copy_memory(&self, memory: &mut Vec<f64>) {
+        self.tilts.clone_into(memory);
+        if self.films == Films::Arcs {
+            memory.extend_from_slice(self.state.dents());
+        }
+        memory.extend((self.state.give() > 0.0).then_some(self.state.give()));
+    }
+
+    fn net_forces(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    fn f_max(&self) -> f64 {
+        self.f_max
+    }
+
+    /// The largest `f |T|`.
+    fn moment(&self) -> f64 {
+        let moments = self.state.loads().iter().enumerate().map(|(c, load)| {
+            let arm = if *load > 0.0 {
+                self.state.moment_arm(&self.lines, c)
+            } else {
+                0.0
+            };
+            (load * arm).abs()
+        });
+        moments.fold(0.0, f64::max)
+    }
+
+    fn contacts<'a>(&'a self, _: &Packing) -> Contacts<'a> {
+        self.contacts.view()
+    }
+
+    fn copy_contacts(&self, _: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        let contacts = self.contacts.view();
+        contacts.pairs.clone_into(pairs);
+        contacts.forces.clone_into(forces);
+    }
+
+    fn torques(&self) -> &[f64] {
+        &[]
+    }
+
+    fn residual(&self) -> f64 {
+        let overlaps = self.contacts.view().overlaps.iter();
+        let scale = overlaps.fold(0.0, |m: f64, d| m.max(d.abs()));
+        let violated = violation(self.state.gaps(), &self.forces);
+        if scale > 0.0 {
+            violated / scale
+        } else {
+            violated
+        }
+    }
+
+    fn accepted_residual(&self) -> f64 {
+        // Soft contacts are on the way to hard ones.
+        if self.state.give() > 0.0 {
+            return -1.0;
+        }
+        ACCEPTED * self.tolerance
+    }
+
+    fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64 {
+        let due = if self.f_max > threshold {
+            self.f_max
+        } else {
+            0.0
+        };
+        ACCEPTED * due_tolerance(packing, self.contacts.view().overlaps, due, self.tolerance)
+    }
+
+    fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
+        let mut stiffness = vec![0.0; packing.len()];
+        let weights: Vec<[f64; 2]> = (0..self.lines.len())
+            .map(|c| self.state.weights(&self.lines, c))
+            .collect();
+        for (c, pair) in self.lines.pairs().iter().enumerate() {
+            if self.forces[c] > 0.0 {
+                let compliance = contact_problem::diagonal(&self.lines, &self.state, &weights, c);
+                for p in pair.map(|p| p as usize) {
+                    stiffness[p] += self.line_tension / compliance;
+                }
+            }
+        }
+        // A packing without contacts moves as one contact would let it.
+        let one = self.line_tension / packing.largest_radius();
+        let stiffest = stiffness.into_iter().fold(one, f64::max);
+        Ok(DT_MAX / (2.0 * stiffest).sqrt())
+    }
+
+    fn stiffens(&self) -> bool {
+        true
+    }
+
+    fn promise(&self, packing: &Packing, frame: &Frame, threshold: f64) -> f64 {
+        let mut restored = self.clone();
+        match restored.restore(packing, frame) {
+            Ok(()) => restored.promised_residual(packing, threshold),
+            Err(_) => 0.0,
+        }
+    }
+
+    fn check(&self, packing: &Packing, frame: &Frame, threshold: f64) -> Check {
+        self.check_frame(packing, frame, threshold)
+    }
+}
