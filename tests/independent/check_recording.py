@@ -54,7 +54,10 @@ class Recording:
                 scene = tomllib.loads(batch["softjam.Scene:toml"][0][0].as_py())
                 self.line_tension = scene["line_tension"]
                 self.gradient = scene.get("forces", "central") == "gradient"
-                self.model_is_disks = scene.get("model", "morse-witten") == "disks"
+                model = scene.get("model", "morse-witten")
+                if model not in ("morse-witten", "disks"):
+                    sys.exit(f"{path} is of the model {model}, whose law is not checked here")
+                self.model_is_disks = model == "disks"
                 self.records_disks = scene.get("disks", {}).get("record", "off") != "off"
                 self.threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
                 self.seed_rule = scene.get("contact_rule") in ("saitoh", "seed")
