@@ -211,7 +211,7 @@ fn text(header: &Header) -> String {
         let [outline, dent, disks] = match scene.model {
             Kind::RoundedPolygon | Kind::WetFoam => [
                 "contour of a droplet",
-                ", deepest dent (length)",
+                ", deepest dent −ΔR/R",
                 "| `/world/disks` | undeformed disks: a click on the eye in the blueprint panel shows them |\n",
             ],
             Kind::MorseWitten => [
