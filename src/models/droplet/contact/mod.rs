@@ -28,7 +28,7 @@ mod law;
 pub mod list;
 pub mod matrix;
 mod search;
-mod second_image;
+pub(super) mod second_image;
 mod set;
 pub mod solver;
 mod tolerance;

@@ -72,7 +72,7 @@ pub(super) fn second_image(
 }
 
 /// `r_i − r_j` to all images of `j` closer than `reach`, but for the nearest.
-fn farther_images(
+pub(in crate::models::droplet) fn farther_images(
     packing: &Packing,
     i: usize,
     j: usize,

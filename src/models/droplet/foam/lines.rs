@@ -162,14 +162,7 @@ impl Lines {
         for p in 0..self.droplets() {
             seen.clear();
             let of_droplet = &sides[self.first[p] as usize..self.first[p + 1] as usize];
-            seen.extend(of_droplet.iter().map(|side| {
-                let direction = self.directions[side.line as usize];
-                if side.is_second {
-                    direction.opposite()
-                } else {
-                    direction
-                }
-            }));
+            seen.extend(of_droplet.iter().map(|side| self.direction(*side)));
             let (count, block) = (seen.len(), self.blocks[p] as usize);
             for (k, a) in seen.iter().enumerate() {
                 self.kernel[block + k * (count + 1)] = 0.75 / PI;
@@ -225,6 +218,16 @@ impl Lines {
     /// `|Δx| sin τ` of a line (length).
     pub fn across(&self, line: usize) -> f64 {
         self.turned[line][1]
+    }
+
+    /// The outward direction of a side.
+    pub fn direction(&self, side: Side) -> Direction {
+        let direction = self.directions[side.line as usize];
+        if side.is_second {
+            direction.opposite()
+        } else {
+            direction
+        }
     }
 
     /// The sides of droplet `p`, and the number of the first.

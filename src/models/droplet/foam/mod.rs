@@ -43,12 +43,14 @@ mod tilts;
 
 pub use state::Films;
 
+use super::contact::second_image::farther_images;
 use super::contact::{ACCEPTED, ContactError, due_tolerance};
+use super::kernel::Direction;
 use crate::contacts::{Contacts, FrameContacts, largest_force};
 use crate::domain::Vec2;
 use crate::models::{Check, Goal, Model};
 use crate::neighbors::NeighborList;
-use crate::state::{Frame, FrameError, Packing};
+use crate::state::{Frame, FrameError, Packing, unit_and_length};
 use contact_problem::{Steps, violation};
 use lines::{Lines, REACH};
 use state::State;
@@ -171,7 +173,7 @@ impl Foam {
                 .steps
                 .solve(given, &mut self.state, forces, self.films, tolerance)
             {
-                return Ok(());
+                return self.has_one_image(packing, tolerance);
             }
             let give = (2.0 * self.state.give()).max(SOFT * packing.largest_radius());
             self.state.set_give(give);
@@ -189,6 +191,39 @@ impl Foam {
             other,
             force: strongest,
         })
+    }
+
+    /// Fails if a droplet touches a second image of a neighbour or one of itself, for which there is no line.
+    fn has_one_image(&self, packing: &Packing, tolerance: f64) -> Result<(), ContactError> {
+        let shortest = packing.domain().shortest();
+        if shortest > 4.0 * REACH * packing.largest_radius() {
+            return Ok(());
+        }
+        let own = (0..packing.len()).map(|p| [p, p]);
+        let pairs = self
+            .lines
+            .pairs()
+            .iter()
+            .map(|pair| pair.map(|p| p as usize));
+        for [particle, other] in own.chain(pairs) {
+            let sum = packing.radii()[particle] + packing.radii()[other];
+            for separation in farther_images(packing, particle, other, REACH * sum) {
+                let (normal, distance) = unit_and_length(separation);
+                let toward = Direction::of(-normal);
+                let reach = self.state.reach(&self.lines, particle, toward);
+                let gap =
+                    distance - reach - self.state.reach(&self.lines, other, toward.opposite());
+                if gap.is_nan() || gap < -tolerance {
+                    return Err(ContactError::BoxTooSmall {
+                        particle,
+                        other,
+                        reach,
+                        shortest,
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Contacts and net forces of the answer at hand.

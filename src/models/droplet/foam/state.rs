@@ -18,6 +18,7 @@
 
 use super::film::Film;
 use super::lines::Lines;
+use crate::models::droplet::kernel::Direction;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
 
@@ -308,6 +309,16 @@ impl State {
             let bulge = self.droplets[p].force / (2.0 * PI) - self.sides[side].k;
             self.dents[p] + self.corners[p] * (fall - bulge)
         })
+    }
+
+    /// The support function `h` of droplet `p`, how far its contour reaches in a direction (length): `r (1 + F/2π + Σ f g/2π)`.
+    pub fn reach(&self, lines: &Lines, p: usize, toward: Direction) -> f64 {
+        let mut sum = self.droplets[p].force;
+        for side in lines.sides(p) {
+            let (c, at) = (side.line as usize, lines.direction(*side));
+            sum += self.loads[c] * toward.g_between(at);
+        }
+        self.corners[p] * (1.0 + sum / (2.0 * PI))
     }
 
     /// `T` of a line (length).

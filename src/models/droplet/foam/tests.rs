@@ -425,3 +425,24 @@ fn droplets_without_room_have_soft_contacts_that_a_frame_remembers() {
         assert!(found.residual < 1e-11, "{films:?}: {found:?}");
     }
 }
+
+#[test]
+fn droplets_that_touch_two_images_of_one_are_refused() {
+    // Itself across the box; and in a row of two, the other on both sides.
+    for (side, count) in [(0.9, 1), (1.8, 2)] {
+        let at = |k: usize| Vec2::new(0.9 * k as f64 + 0.1, 1.0);
+        let domain = Domain::new(side, 4.0).unwrap();
+        let packing = Packing::new(domain, vec![0.5; count], (0..count).map(at).collect()).unwrap();
+        for films in [Films::Straight, Films::Arcs] {
+            let error = Foam::new(films, 1.0, 1e-12).solve(&packing, Goal::EXACT);
+            let refused = matches!(error, Err(ContactError::BoxTooSmall { particle: 0, .. }));
+            assert!(refused, "{error:?}");
+        }
+    }
+    // Three in a row have each other once.
+    let at = |k: usize| Vec2::new(0.9 * k as f64 + 0.1, 1.0);
+    let domain = Domain::new(2.7, 4.0).unwrap();
+    let packing = Packing::new(domain, vec![0.5; 3], (0..3).map(at).collect()).unwrap();
+    let foam = settled(Films::Arcs, &packing);
+    assert_eq!(foam.contacts.view().forces.len(), 3);
+}
