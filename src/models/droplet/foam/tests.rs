@@ -3,6 +3,8 @@
 use super::film::Film;
 use super::*;
 use crate::domain::Domain;
+use crate::models::{Goal, Model};
+use crate::state::Frame;
 use core::f64::consts::PI;
 use serde::Deserialize;
 

@@ -1,0 +1,203 @@
+//! [`Foam`] as a [`Model`]: what a step does with tilts and forces, and what a frame remembers.
+
+use super::contact_problem::{diagonal, violation};
+use super::{DT_MAX, Films, Foam, HARDENS, tilts};
+use crate::contacts::Contacts;
+use crate::domain::Vec2;
+use crate::models::droplet::contact::{ACCEPTED, ContactError, due_tolerance};
+use crate::models::{Check, Goal, Model};
+use crate::state::{Frame, FrameError, Packing};
+
+impl Model for Foam {
+    fn line_tension(&self) -> f64 {
+        self.line_tension
+    }
+
+    /// Far from balance the tilts make one step between two contact problems. Where no frame is at hand, or the goal is
+    /// [`Goal::EXACT`], they are solved for.
+    fn solve(&mut self, packing: &Packing, goal: Goal) -> Result<(), ContactError> {
+        if goal == Goal::EXACT || self.net.len() != packing.len() {
+            return self.settle(packing);
+        }
+        tilts::step(&self.lines, &self.state, &mut self.tilts);
+        self.set_lines(packing);
+        if goal.f_max < HARDENS {
+            self.state.set_give(0.0);
+        }
+        let mut due = goal.due(goal.f_max);
+        loop {
+            let tolerance = self.due(packing, due);
+            self.find_forces(packing, tolerance)?;
+            self.balance(packing);
+            let now = goal.due(self.f_max);
+            if due == 0.0
+                || (now > 0.0 && self.residual() <= self.promised_residual(packing, goal.threshold))
+            {
+                return Ok(());
+            }
+            due = if self.f_max < due {
+                goal.due(0.5 * self.f_max)
+            } else {
+                0.0
+            };
+        }
+    }
+
+    fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError> {
+        const MEMORY: FrameError = FrameError::Foreign {
+            what: "a memory that is not that of its droplets",
+        };
+        self.set_lines(packing);
+        let lines = self.lines.len();
+        let dents = match self.films {
+            Films::Straight => 0,
+            Films::Arcs => packing.len(),
+        };
+        let parts = frame.memory.split_at_checked(lines);
+        let parts = parts.and_then(|(tilts, rest)| Some((tilts, rest.split_at_checked(dents)?)));
+        let Some((tilts, (dents, give))) = parts else {
+            return Err(MEMORY);
+        };
+        let give = match give {
+            [] => 0.0,
+            [give] if *give > 0.0 && give.is_finite() => *give,
+            _ => return Err(MEMORY),
+        };
+        let possible = tilts.iter().all(|tilt| tilt.abs() < 1.0);
+        let mut sensible = dents.iter().zip(packing.radii());
+        if !possible || !sensible.all(|(d, radius)| *d < *radius && *d > -10.0 * radius) {
+            return Err(MEMORY);
+        }
+        tilts.clone_into(&mut self.tilts);
+        self.state.set_dents(dents);
+        self.state.set_give(give);
+        self.forces.fill(0.0);
+        let mut contacts = frame.contacts.iter().zip(&frame.forces).peekable();
+        for (pair, force) in self.lines.pairs().iter().zip(&mut self.forces) {
+            if let Some((_, f)) = contacts.next_if(|(of, _)| *of == pair) {
+                *force = *f;
+            }
+        }
+        self.lines.turn(&self.tilts);
+        let given = (&self.lines, packing.radii());
+        let forces = (&self.forces[..], self.line_tension);
+        let holds = contacts.next().is_none() && frame.forces.iter().all(|f| *f > 0.0);
+        if !holds
+            || !self
+                .state
+                .evaluate(given, forces, self.films, f64::INFINITY)
+        {
+            return Err(FrameError::Foreign {
+                what: "forces that no droplets can bear",
+            });
+        }
+        self.balance(packing);
+        Ok(())
+    }
+
+    fn copy_memory(&self, memory: &mut Vec<f64>) {
+        self.tilts.clone_into(memory);
+        if self.films == Films::Arcs {
+            memory.extend_from_slice(self.state.dents());
+        }
+        memory.extend((self.state.give() > 0.0).then_some(self.state.give()));
+    }
+
+    fn net_forces(&self) -> &[Vec2] {
+        &self.net
+    }
+
+    fn f_max(&self) -> f64 {
+        self.f_max
+    }
+
+    /// The largest `f |T|`.
+    fn moment(&self) -> f64 {
+        let moments = self.state.loads().iter().enumerate().map(|(c, load)| {
+            let arm = if *load > 0.0 {
+                self.state.moment_arm(&self.lines, c)
+            } else {
+                0.0
+            };
+            (load * arm).abs()
+        });
+        moments.fold(0.0, f64::max)
+    }
+
+    fn contacts<'a>(&'a self, _: &Packing) -> Contacts<'a> {
+        self.contacts.view()
+    }
+
+    fn copy_contacts(&self, _: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        let contacts = self.contacts.view();
+        contacts.pairs.clone_into(pairs);
+        contacts.forces.clone_into(forces);
+    }
+
+    fn torques(&self) -> &[f64] {
+        &[]
+    }
+
+    fn residual(&self) -> f64 {
+        let overlaps = self.contacts.view().overlaps.iter();
+        let scale = overlaps.fold(0.0, |m: f64, d| m.max(d.abs()));
+        let violated = violation(self.state.gaps(), &self.forces);
+        if scale > 0.0 {
+            violated / scale
+        } else {
+            violated
+        }
+    }
+
+    fn accepted_residual(&self) -> f64 {
+        // Soft contacts are on the way to hard ones.
+        if self.state.give() > 0.0 {
+            return -1.0;
+        }
+        ACCEPTED * self.tolerance
+    }
+
+    fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64 {
+        let due = if self.f_max > threshold {
+            self.f_max
+        } else {
+            0.0
+        };
+        ACCEPTED * due_tolerance(packing, self.contacts.view().overlaps, due, self.tolerance)
+    }
+
+    fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
+        let mut stiffness = vec![0.0; packing.len()];
+        let weights: Vec<[f64; 2]> = (0..self.lines.len())
+            .map(|c| self.state.weights(&self.lines, c))
+            .collect();
+        for (c, pair) in self.lines.pairs().iter().enumerate() {
+            if self.forces[c] > 0.0 {
+                let compliance = diagonal(&self.lines, &self.state, &weights, c);
+                for p in pair.map(|p| p as usize) {
+                    stiffness[p] += self.line_tension / compliance;
+                }
+            }
+        }
+        // A packing without contacts moves as one contact would let it.
+        let one = self.line_tension / packing.largest_radius();
+        let stiffest = stiffness.into_iter().fold(one, f64::max);
+        Ok(DT_MAX / (2.0 * stiffest).sqrt())
+    }
+
+    fn stiffens(&self) -> bool {
+        true
+    }
+
+    fn promise(&self, packing: &Packing, frame: &Frame, threshold: f64) -> f64 {
+        let mut restored = self.clone();
+        match restored.restore(packing, frame) {
+            Ok(()) => restored.promised_residual(packing, threshold),
+            Err(_) => 0.0,
+        }
+    }
+
+    fn check(&self, packing: &Packing, frame: &Frame, threshold: f64) -> Check {
+        self.check_frame(packing, frame, threshold)
+    }
+}
