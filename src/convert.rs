@@ -248,7 +248,7 @@ impl Conversion {
         if let Some(from) = self.last.take() {
             self.write_frame(recording, &from, false)?;
             let behind = from.step + 1;
-            let channels = self.scheduled(recording, &from);
+            let channels = recording.scene().scheduled(&self.channels, from.stage);
             if self.lacks_something(&channels, behind, frame.step) {
                 self.walk(recording, from, &frame)?;
             } else {
@@ -262,16 +262,6 @@ impl Conversion {
         self.waiting = self.waiting.split_off(&frame.step);
         self.last = Some(frame);
         Ok(())
-    }
-
-    /// The channels in the stage of `frame`.
-    fn scheduled(&self, recording: &Recording, frame: &Frame) -> Channels {
-        let scene = recording.scene();
-        if frame.stage == 0 && scene.records_disks() {
-            self.channels.of_disks(scene.disks.record)
-        } else {
-            self.channels
-        }
     }
 
     /// Whether the channels ask for something at the steps from `behind` to before `until` that was not recorded.
@@ -346,7 +336,7 @@ impl Conversion {
         let step = frame.step;
         let begins_stage = core::mem::replace(&mut self.stage, frame.stage) != frame.stage;
         let edge = last || step == self.first || begins_stage;
-        let channels = self.scheduled(recording, frame);
+        let channels = recording.scene().scheduled(&self.channels, frame.stage);
         let [contours, contacts, metrics, state] = channels.at(step, edge);
         let row = self.waiting.get(&step).and_then(Row::whole);
         let metrics = match (metrics, row) {

@@ -78,10 +78,16 @@ pub trait Model {
     fn contacts<'a>(&'a self, packing: &Packing) -> Contacts<'a>;
 
     /// Pairs and forces of [`contacts`](Self::contacts), copied to where others were.
-    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>);
+    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
+        let contacts = self.contacts(packing);
+        contacts.pairs.clone_into(pairs);
+        contacts.forces.clone_into(forces);
+    }
 
     /// The torque of each contact (force·length), where contacts push aside as well as away; otherwise empty.
-    fn torques(&self) -> &[f64];
+    fn torques(&self) -> &[f64] {
+        &[]
+    }
 
     /// How far the answer is from the law of the contacts, relative to the largest `|δ|`.
     fn residual(&self) -> f64;
@@ -133,10 +139,33 @@ impl Goal {
         moved: f64::INFINITY,
     };
 
-    /// The `f_max` that the tolerance follows: 0, for the full tolerance, in a frame that might be the last.
+    /// [`due`] at this goal's threshold.
     pub(crate) fn due(&self, f_max: f64) -> f64 {
-        if f_max > self.threshold { f_max } else { 0.0 }
+        due(f_max, self.threshold)
     }
+
+    /// What a solution to the tolerance of `due` has to be tightened to, where its forces give `f_max`; `None` if it is good enough:
+    /// if it has the full tolerance, or keeps its promise in a frame that cannot be the last.
+    pub(crate) fn tighter(
+        &self,
+        due: f64,
+        f_max: f64,
+        keeps_promise: impl FnOnce() -> bool,
+    ) -> Option<f64> {
+        if due == 0.0 || (self.due(f_max) > 0.0 && keeps_promise()) {
+            return None;
+        }
+        Some(if f_max < due {
+            self.due(0.5 * f_max)
+        } else {
+            0.0
+        })
+    }
+}
+
+/// The `f_max` that a tolerance follows (units of γ): 0, for the full tolerance, in a frame that might be the last.
+pub(crate) fn due(f_max: f64, threshold: f64) -> f64 {
+    if f_max > threshold { f_max } else { 0.0 }
 }
 
 /// The models by the names that scenes have for them.

@@ -1,6 +1,6 @@
 //! The undeformed disks that droplets start from.
 
-use super::{Minimizer, Preparation, Scene, Schedule, Start};
+use super::{Channels, Minimizer, Preparation, Scene, Schedule, Start};
 use crate::minimize::fire::Fire;
 use crate::models::Kind;
 use crate::models::droplet::Form;
@@ -69,6 +69,16 @@ impl Scene {
             Cow::Owned(self.of_disks())
         } else {
             Cow::Borrowed(self)
+        }
+    }
+
+    /// What `channels` ask for in a stage of a run of this scene.
+    #[must_use]
+    pub fn scheduled(&self, channels: &Channels, stage: u32) -> Channels {
+        if stage == 0 && self.records_disks() {
+            channels.of_disks(self.disks.record)
+        } else {
+            *channels
         }
     }
 

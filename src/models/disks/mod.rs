@@ -134,16 +134,6 @@ impl Model for Disks {
         self.contacts_at(packing).view()
     }
 
-    fn copy_contacts(&self, packing: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
-        let contacts = self.contacts_at(packing).view();
-        contacts.pairs.clone_into(pairs);
-        contacts.forces.clone_into(forces);
-    }
-
-    fn torques(&self) -> &[f64] {
-        &[]
-    }
-
     fn residual(&self) -> f64 {
         0.0
     }

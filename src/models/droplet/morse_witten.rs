@@ -5,7 +5,7 @@ use super::form::{Form, NetForces};
 use super::frequency::largest_frequency;
 use crate::contacts::{Contacts, largest_force};
 use crate::domain::Vec2;
-use crate::models::{Check, Goal, Model};
+use crate::models::{Check, Goal, Model, due};
 use crate::state::{Frame, FrameError, Packing};
 
 /// `dt_max ω_max`. The limit of stability is 2 for the linear problem with its contacts held fixed. Geometric means of the steps
@@ -81,15 +81,10 @@ impl Model for MorseWitten {
         self.law.solve_within(packing, due, goal.moved)?;
         self.balance(packing);
         // The full tolerance, due at 0, keeps every promise; a frame that might be the last is always solved to it.
-        while due > 0.0
-            && (goal.due(self.f_max) == 0.0
-                || self.law.residual() > self.promised_residual(packing, goal.threshold))
-        {
-            due = if self.f_max < due {
-                goal.due(0.5 * self.f_max)
-            } else {
-                0.0
-            };
+        while let Some(tighter) = goal.tighter(due, self.f_max, || {
+            self.law.residual() <= self.promised_residual(packing, goal.threshold)
+        }) {
+            due = tighter;
             self.law.tighten(packing, due)?;
             self.balance(packing);
         }
@@ -133,12 +128,7 @@ impl Model for MorseWitten {
     /// Sixteen times the [tolerance](super::contact::due_tolerance) at the frame's `f_max`, at the full tolerance if `f_max` is
     /// not above the threshold.
     fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64 {
-        let due = if self.f_max > threshold {
-            self.f_max
-        } else {
-            0.0
-        };
-        ACCEPTED * self.law.tolerance_at(packing, due)
+        ACCEPTED * self.law.tolerance_at(packing, due(self.f_max, threshold))
     }
 
     /// `1.2/ω_max`.

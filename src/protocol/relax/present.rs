@@ -49,7 +49,7 @@ impl Relaxation {
     #[must_use]
     pub fn scheduled(&self, channels: &Channels) -> Channels {
         match &self.next {
-            Some(scene) => channels.of_disks(scene.disks.record),
+            Some(scene) => scene.scheduled(channels, self.stage),
             None => *channels,
         }
     }

@@ -38,8 +38,7 @@ impl Droplet {
 
     /// `R − ρ` in the direction `angle`, of a film bent by `bend` (length).
     fn hollow(&self, angle: f64, bend: f64) -> f64 {
-        let fall = 2.0 * libm::pow(libm::sin(0.5 * bend), 2.0);
-        self.dent + self.corner * (fall - self.force / (2.0 * PI) - self.bulge(angle))
+        self.dent + self.corner * (fall(bend) - self.force / (2.0 * PI) - self.bulge(angle))
     }
 
     /// `m` of the contact in the direction `angle` (length).
@@ -76,6 +75,12 @@ impl Droplet {
     fn energy(&self) -> f64 {
         self.corner * self.second() + PI * self.dent * self.dent / self.corner
     }
+}
+
+/// `1 − cos` of an angle.
+fn fall(angle: f64) -> f64 {
+    let sin = libm::sin(0.5 * angle);
+    2.0 * sin * sin
 }
 
 /// A frame's droplets with their contacts.
@@ -145,7 +150,7 @@ impl<'a> Seen<'a> {
 
     /// `|Δx| − n·Δx` (length).
     fn turned(&self, pair: [u32; 2], tilt: f64) -> f64 {
-        2.0 * self.line(pair, tilt).0 * libm::pow(libm::sin(0.5 * tilt), 2.0)
+        self.line(pair, tilt).0 * fall(tilt)
     }
 
     /// `R_i + R_j − n·Δx` (length).

@@ -118,7 +118,7 @@ impl Steps {
             .extend((0..count).map(|c| state.weights(lines, c)));
         self.inverse_diagonal.clear();
         self.inverse_diagonal
-            .extend((0..count).map(|c| 1.0 / diagonal(lines, state, &self.weights, c)));
+            .extend((0..count).map(|c| 1.0 / diagonal(lines, state, c)));
         self.softness.clear();
         self.softness
             .extend((0..count).map(|c| state.film(c).softness() + state.give()));
@@ -269,13 +269,13 @@ impl Steps {
 }
 
 /// `B_cc` (length/force).
-pub(super) fn diagonal(lines: &Lines, state: &State, weights: &[[f64; 2]], line: usize) -> f64 {
+pub(super) fn diagonal(lines: &Lines, state: &State, line: usize) -> f64 {
     let pair = lines.pairs()[line];
     let of_end = |(p, u): (u32, f64)| {
         let p = p as usize;
         state.corners()[p] / (4.0 * PI) + u * u / state.droplets()[p].stiffness
     };
-    let [i, j] = weights[line];
+    let [i, j] = state.weights(lines, line);
     of_end((pair[0], i)) + of_end((pair[1], j)) + state.film(line).softness() + state.give()
 }
 

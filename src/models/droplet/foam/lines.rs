@@ -147,12 +147,12 @@ impl Lines {
         self.directions.clear();
         let directions = self.normals.iter().map(|n| Direction::of(*n));
         self.directions.extend(directions);
-        let mut sides = core::mem::take(&mut self.sides);
+        let sides = core::mem::take(&mut self.sides);
         wide(
             #[inline(always)]
             || self.fill_blocks(&sides),
         );
-        core::mem::swap(&mut self.sides, &mut sides);
+        self.sides = sides;
     }
 
     /// `Â` and `G` of all droplets: each pair of sides once, since the first is even and the second odd.
@@ -230,7 +230,7 @@ impl Lines {
         }
     }
 
-    /// The sides of droplet `p`, and the number of the first.
+    /// The sides of droplet `p`.
     pub fn sides(&self, p: usize) -> &[Side] {
         &self.sides[self.first[p] as usize..self.first[p + 1] as usize]
     }

@@ -147,11 +147,9 @@ impl Foam {
         self.near
             .update(packing, margin, 0.1 * packing.largest_radius());
         let before = self.lines.pairs().to_vec();
-        let known = [&self.tilts, &self.forces].map(Vec::clone);
+        let known = [&mut self.tilts, &mut self.forces].map(core::mem::take);
         self.lines.set(packing, self.near.pairs());
         let mut next = 0;
-        self.tilts.clear();
-        self.forces.clear();
         for pair in self.lines.pairs() {
             while before.get(next).is_some_and(|old| old < pair) {
                 next += 1;

@@ -5,7 +5,7 @@ use super::{DT_MAX, Films, Foam, HARDENS, tilts};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contact::{ACCEPTED, ContactError, due_tolerance};
-use crate::models::{Check, Goal, Model};
+use crate::models::{Check, Goal, Model, due};
 use crate::state::{Frame, FrameError, Packing};
 
 impl Model for Foam {
@@ -24,23 +24,16 @@ impl Model for Foam {
         if goal.f_max < HARDENS {
             self.state.set_give(0.0);
         }
-        let mut due = goal.due(goal.f_max);
-        loop {
+        let mut next = Some(goal.due(goal.f_max));
+        while let Some(due) = next {
             let tolerance = self.due(packing, due);
             self.find_forces(packing, tolerance)?;
             self.balance(packing);
-            let now = goal.due(self.f_max);
-            if due == 0.0
-                || (now > 0.0 && self.residual() <= self.promised_residual(packing, goal.threshold))
-            {
-                return Ok(());
-            }
-            due = if self.f_max < due {
-                goal.due(0.5 * self.f_max)
-            } else {
-                0.0
-            };
+            next = goal.tighter(due, self.f_max, || {
+                self.residual() <= self.promised_residual(packing, goal.threshold)
+            });
         }
+        Ok(())
     }
 
     fn restore(&mut self, packing: &Packing, frame: &Frame) -> Result<(), FrameError> {
@@ -128,16 +121,6 @@ impl Model for Foam {
         self.contacts.view()
     }
 
-    fn copy_contacts(&self, _: &Packing, pairs: &mut Vec<[u32; 2]>, forces: &mut Vec<f64>) {
-        let contacts = self.contacts.view();
-        contacts.pairs.clone_into(pairs);
-        contacts.forces.clone_into(forces);
-    }
-
-    fn torques(&self) -> &[f64] {
-        &[]
-    }
-
     fn residual(&self) -> f64 {
         let overlaps = self.contacts.view().overlaps.iter();
         let scale = overlaps.fold(0.0, |m: f64, d| m.max(d.abs()));
@@ -158,22 +141,15 @@ impl Model for Foam {
     }
 
     fn promised_residual(&self, packing: &Packing, threshold: f64) -> f64 {
-        let due = if self.f_max > threshold {
-            self.f_max
-        } else {
-            0.0
-        };
+        let due = due(self.f_max, threshold);
         ACCEPTED * due_tolerance(packing, self.contacts.view().overlaps, due, self.tolerance)
     }
 
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
         let mut stiffness = vec![0.0; packing.len()];
-        let weights: Vec<[f64; 2]> = (0..self.lines.len())
-            .map(|c| self.state.weights(&self.lines, c))
-            .collect();
         for (c, pair) in self.lines.pairs().iter().enumerate() {
             if self.forces[c] > 0.0 {
-                let compliance = diagonal(&self.lines, &self.state, &weights, c);
+                let compliance = diagonal(&self.lines, &self.state, c);
                 for p in pair.map(|p| p as usize) {
                     stiffness[p] += self.line_tension / compliance;
                 }

@@ -23,9 +23,8 @@ const LONGEST: f64 = 0.1;
 /// Turns the tilts of all lines by a step, from the state at the tilts before.
 pub(super) fn step(lines: &Lines, state: &State, tilts: &mut [f64]) {
     let (count, loads) = (lines.len(), state.loads());
-    let weights: Vec<[f64; 2]> = (0..count).map(|c| state.weights(lines, c)).collect();
     let softness: Vec<f64> = (0..count)
-        .map(|c| 1.0 / diagonal(lines, state, &weights, c))
+        .map(|c| 1.0 / diagonal(lines, state, c))
         .collect();
     let mut stiffness = vec![[0.0; 2]; count];
     for p in 0..lines.droplets() {
