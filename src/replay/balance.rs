@@ -82,6 +82,8 @@ pub struct Balance {
     pub frames: u64,
     /// The step of the last frame, and its `f_max` from positions alone (units of γ).
     pub last: Option<(u64, f64)>,
+    /// The largest moment of a contact in the last frame (γ·length).
+    last_moment: f64,
 }
 
 /// How far a residual may always be from zero: round-off, and the full tolerance amplified by a matrix of condition 6.
@@ -106,6 +108,7 @@ impl Balance {
             energy_and_pressure: Worst::default(),
             frames: 0,
             last: None,
+            last_moment: 0.0,
         }
     }
 
@@ -123,6 +126,7 @@ impl Balance {
         let found = (self.stage.1).check(packing, frame, scene.threshold);
         self.frames += 1;
         self.last = Some((step, found.f_max));
+        self.last_moment = found.moment;
         self.last_equation_4 = found.residual;
         let lengths = found.promised.max(ALLOWED);
         let ratio = packing.largest_radius() / packing.smallest_radius();
@@ -162,7 +166,7 @@ impl Balance {
             && within(&self.energy_and_pressure)
     }
 
-    /// Whether the last frame bears out a result: a converged run ends with `f_max` not above its threshold. The recorded `f_max` may be
+    /// Whether the last frame bears out a result: a converged run ends with `f_max` and moments not above its threshold. The recorded `f_max` may be
     /// off by `tolerance` (units of γ), 0 for the same bits.
     ///
     /// ```
@@ -181,7 +185,9 @@ impl Balance {
             step == outcome.steps
                 && (f_max.to_bits() == outcome.f_max.to_bits()
                     || (f_max - outcome.f_max).abs() <= tolerance)
-                && outcome.converged == (outcome.f_max <= self.scene.threshold)
+                && outcome.converged
+                    == (outcome.f_max <= self.scene.threshold
+                        && self.last_moment <= self.scene.threshold)
         })
     }
 }

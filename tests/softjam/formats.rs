@@ -4,8 +4,9 @@ use crate::common::Folder;
 use crate::files::{FORMATS, judged, open, record_as, states};
 use softjam::convert;
 use softjam::domain::Domain;
-use softjam::models::Kind;
-use softjam::record::Writer;
+use softjam::models::{Kind, Model};
+use softjam::protocol::Relaxation;
+use softjam::record::{Outcome, Writer};
 use softjam::replay::{Balance, Bytes, Recording, Way, determinism};
 use softjam::scene::{Channels, Scene, Schedule};
 use softjam::state::Frame;
@@ -227,4 +228,37 @@ fn droplets_that_keep_their_area_are_recorded_replayed_and_converted() {
             );
         }
     }
+}
+
+#[test]
+fn a_packing_whose_moments_are_not_balanced_has_not_converged() {
+    let mut scene = Scene {
+        model: Kind::WetFoam,
+        particles: 32,
+        phi: 0.93,
+        ..Scene::default()
+    };
+    let mut start = Relaxation::new(&scene).expect("a valid scene");
+    let balanced = start.by_ref().last().expect("a frame").expect("no failure");
+    let packing = start.packing();
+    // A contact of large droplets that is turned from balance has a moment larger than its net force.
+    let turned = |k: usize| {
+        let mut frame = balanced.clone();
+        frame.memory[k] += 1e-4;
+        Relaxation::resume(&scene, packing.clone(), frame).expect("a frame")
+    };
+    let uneven = |run: &Relaxation| run.f_max() < 0.85 * run.model().moment();
+    let run = (0..balanced.contacts.len()).map(turned).find(uneven);
+    let run = run.expect("one of the contacts");
+    let frame = run.frame();
+    scene.threshold = 0.9 * run.model().moment();
+    let mut balance = Balance::new(&scene);
+    balance.check(run.packing(), &frame, &[]);
+    let claim = |converged| Outcome {
+        converged,
+        steps: frame.step,
+        f_max: run.f_max(),
+        stability: None,
+    };
+    assert!(!balance.bears_out(&claim(true), 0.0) && balance.bears_out(&claim(false), 0.0));
 }

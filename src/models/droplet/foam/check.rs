@@ -190,11 +190,10 @@ impl<'a> Seen<'a> {
         turns.fold(known, |least, tilt| least.min(-self.gap(pair, tilt, 0.0)))
     }
 
-    /// `f |T|` of a contact (γ·length).
-    fn moment(&self, pair: [u32; 2], tilt: f64, load: f64) -> f64 {
+    /// `T` of a contact (length).
+    fn moment_arm(&self, pair: [u32; 2], tilt: f64) -> f64 {
         let ((distance, angle), [i, j]) = (self.line(pair, tilt), self.ends(pair));
-        let apart = distance * libm::sin(tilt);
-        (load * (apart + i.midpoint(angle) + j.midpoint(angle + PI))).abs()
+        distance * libm::sin(tilt) + i.midpoint(angle) + j.midpoint(angle + PI)
     }
 
     /// What an arc adds to a straight film: `C`, and `∂C/∂r` of both droplets.
@@ -231,11 +230,14 @@ impl Foam {
         let seen = Seen::of(&run, packing, &contacts);
         let mut areas: Vec<f64> = seen.droplets.iter().map(Droplet::area).collect();
         let mut energy: f64 = seen.droplets.iter().map(Droplet::energy).sum();
-        let (mut residual, mut moment, mut work) = (0.0_f64, 0.0_f64, 0.0);
+        let (mut residual, mut work) = (0.0_f64, 0.0);
         for (&pair, f) in contacts.pairs.iter().zip(contacts.forces) {
             let (load, tilt) = (f / gamma, seen.tilt(pair));
             residual = worse(residual, seen.gap(pair, tilt, load).abs());
-            moment = worse(moment, seen.moment(pair, tilt, load));
+            // The run's own midpoints decide on its moment; here they are what they should be.
+            let line = run.lines.pairs().binary_search(&pair);
+            let arm = line.map_or(f64::NAN, |c| run.state.moment_arm(&run.lines, c));
+            residual = worse(residual, (seen.moment_arm(pair, tilt) - arm).abs());
             let [film, psi_i, psi_j] = seen.film(pair, load);
             work += load * (seen.line(pair, tilt).0 - seen.turned(pair, tilt));
             let dents: f64 = seen.ends(pair).iter().map(|droplet| droplet.dent).sum();
@@ -261,7 +263,7 @@ impl Foam {
         let promised = run.promised_residual(packing, threshold);
         let found = (residual, overlap);
         Check {
-            moment,
+            moment: run.moment(),
             energy,
             pressure: work / (2.0 * domain.area()),
             ..Check::of(&contacts, domain, gamma, (promised, run.f_max()), found)
