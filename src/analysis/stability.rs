@@ -20,12 +20,13 @@
 use crate::analysis::held;
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
-use crate::minimize::newton::{Stiffness, dot};
+use crate::minimize::newton::Stiffness;
 use crate::models::droplet::Form;
 use crate::models::droplet::contact::ContactLaw;
-use crate::models::droplet::linear::Linear;
-use crate::models::{AnyModel, Model, disks};
+use crate::models::droplet::linear::{Linear, Linearised};
+use crate::models::{AnyModel, Model, disks, droplet};
 use crate::numerics::folded;
+use crate::numerics::gmres::dot;
 use crate::state::Packing;
 use nalgebra::{DMatrix, DVector};
 
@@ -176,8 +177,16 @@ pub(crate) fn judge(packing: &Packing, model: &AnyModel) -> Judgement {
             law.restore(packing, contacts.pairs, contacts.forces);
             lowest_of_droplets(packing, &law, droplets.form())
         }
-        // Not yet: its stiffness answers to tilts and areas, too.
-        AnyModel::Foam(_) => None,
+        AnyModel::Foam(droplets) => {
+            let mut linear = droplet::foam::linear::Linear::default();
+            let numbers: Vec<usize> = kept.iter().map(|c| c.start).collect();
+            let is_set = linear.set(droplets, &numbers);
+            let compliances = linear.compliances().to_vec();
+            let product = |x: &[f64], y: &mut [f64]| linear.product(x, y, ACCURACY);
+            is_set
+                .then(|| lowest(packing.len(), &contacts, &compliances, product))
+                .flatten()
+        }
         AnyModel::Disks(_) => {
             let compliances = disks::compliances(packing, contacts.pairs, model.line_tension());
             lowest(packing.len(), &contacts, &compliances, |x, y| {

@@ -1,7 +1,7 @@
 //! FIRE, which Newton's method may finish: what a relaxation moves its particles by.
 
 use super::fire::{Fire, FireState};
-use super::newton::{Attempt, Newton};
+use super::newton::{Attempt, Newton, foam};
 use crate::domain::Vec2;
 use crate::models::{AnyModel, Model};
 use crate::state::{Numbers, Packing};
@@ -18,13 +18,20 @@ pub(crate) enum Motion {
     Solved,
 }
 
+/// Newton's method, for either kind of droplets.
+#[derive(Clone, Debug, Default)]
+struct Finish {
+    linear: Newton,
+    foam: foam::Newton,
+}
+
 /// A minimiser at work.
 #[derive(Clone, Debug)]
 pub(crate) struct Mover {
     fire: Fire,
     state: FireState,
     /// What finishes; `None` where FIRE goes all the way.
-    newton: Option<Newton>,
+    newton: Option<Finish>,
 }
 
 impl Mover {
@@ -47,7 +54,7 @@ impl Mover {
         Self {
             fire,
             state,
-            newton: finishes.then(Newton::default),
+            newton: finishes.then(Finish::default),
         }
     }
 
@@ -112,20 +119,34 @@ impl Mover {
         model: &mut AnyModel,
         threshold: f64,
     ) -> bool {
-        let (Some(newton), AnyModel::MorseWitten(droplets)) = (&mut self.newton, model) else {
+        let Some(newton) = &mut self.newton else {
             return false;
         };
         let turns = &mut self.state.turns;
         // Only Newton's method leaves the particles at rest.
         let goes_on = turns.moves > 0 && velocities.iter().all(|v| *v == Vec2::zeros());
-        if !Newton::is_due(droplets, goes_on) {
+        let is_due = match model {
+            AnyModel::MorseWitten(droplets) => Newton::is_due(droplets, goes_on),
+            AnyModel::Foam(droplets) => foam::Newton::is_due(droplets, packing, goes_on),
+            AnyModel::Disks(_) => false,
+        };
+        if !is_due {
             return false;
         }
         if turns.wait > 0 {
             turns.wait -= 1;
             return false;
         }
-        let attempt = newton.advance(packing, droplets, threshold, turns.is_patient());
+        let patient = turns.is_patient();
+        let attempt = match model {
+            AnyModel::MorseWitten(droplets) => {
+                (newton.linear).advance(packing, droplets, threshold, patient)
+            }
+            AnyModel::Foam(droplets) => {
+                (newton.foam).advance(packing, droplets, threshold, patient)
+            }
+            AnyModel::Disks(_) => Attempt::GivenUp,
+        };
         let kept = attempt != Attempt::GivenUp;
         if kept {
             turns.succeed(attempt == Attempt::Halved);

@@ -1,8 +1,9 @@
-//! What is not physics: a sparse factorisation with one order of sums, sums that no order reaches, loops for wide vectors, a second thread.
+//! What is not physics: a sparse factorisation with one order of sums, sums that no order reaches, general linear systems, loops for wide vectors, a second thread.
 //!
 //! See the example of [`threads::with`].
 
 pub(crate) mod exact_sum;
+pub(crate) mod gmres;
 pub(crate) mod simplicial;
 pub mod threads;
 pub(crate) mod wide;

@@ -8,18 +8,20 @@ use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    CholeskySymbolicParams, LdltRef, LltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-/// A symmetric matrix of square blocks of side `BLOCK`, by its lower triangle, and its factor `L Lᵀ`.
+/// A symmetric matrix of square blocks of side `BLOCK`, by its lower triangle, and its factor: `L Lᵀ`, or `L D Lᵀ` without exchanges of rows where
+/// it is `SIGNED`, which every matrix has whose pivots are positive for some rows and negative for the others in whatever order (a *quasidefinite*
+/// one: R. J. Vanderbei, SIAM J. Optim. 5, 100 (1995)).
 ///
 /// The ordering is approximate minimum degree on the graph of the blocks. It and the pattern of `L` are kept while the
 /// pattern of the matrix stays; they depend on nothing else.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Simplicial<const BLOCK: usize> {
+pub(crate) struct Simplicial<const BLOCK: usize, const SIGNED: bool = false> {
     /// Column pointers and rows (ascending, the diagonal first) of the lower triangle of blocks.
     pointers: Vec<u32>,
     rows: Vec<u32>,
@@ -32,11 +34,11 @@ pub(crate) struct Simplicial<const BLOCK: usize> {
     analyses: u64,
 }
 
-/// There is no factor: the index of the pivot that is not positive, or 0 where memory was short.
+/// There is no factor: the index of the pivot that is not positive (is 0, of a signed one), or 0 where memory was short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NotPositive(pub(crate) usize);
 
-impl<const BLOCK: usize> Simplicial<BLOCK> {
+impl<const BLOCK: usize, const SIGNED: bool> Simplicial<BLOCK, SIGNED> {
     /// Factorises the matrix of `blocks`: `rows[pointers[c]..pointers[c + 1]]` are the block rows of block column `c`,
     /// ascending, the diagonal first; a block is stored by columns, of diagonal blocks the lower triangle is used.
     pub(crate) fn factorize(
@@ -71,25 +73,43 @@ impl<const BLOCK: usize> Simplicial<BLOCK> {
         );
         self.factor.clear();
         self.factor.resize(symbolic.len_val(), 0.0);
-        let mut memory = MemBuffer::new(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-        );
-        symbolic
-            .factorize_numeric_llt(
+        let matrix = SparseColMatRef::new(pattern, &self.scalar_values);
+        if SIGNED {
+            let mut memory = MemBuffer::new(
+                symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()),
+            );
+            let factored = symbolic.factorize_numeric_ldlt(
                 &mut self.factor,
-                SparseColMatRef::new(pattern, &self.scalar_values),
+                matrix,
                 Side::Lower,
                 Default::default(),
                 Par::Seq,
                 MemStack::new(&mut memory),
                 Default::default(),
-            )
-            .map(|_| ())
-            .map_err(|error| match error {
-                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
+            );
+            return factored.map(|_| ()).map_err(|error| match error {
+                faer::linalg::cholesky::ldlt::factor::LdltError::ZeroPivot { index } => {
                     NotPositive(index)
                 }
-            })
+            });
+        }
+        let mut memory = MemBuffer::new(
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+        );
+        let factored = symbolic.factorize_numeric_llt(
+            &mut self.factor,
+            matrix,
+            Side::Lower,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        );
+        factored.map(|_| ()).map_err(|error| match error {
+            faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
+                NotPositive(index)
+            }
+        })
     }
 
     /// Solves in place with the factor found last; does nothing where there is none.
@@ -99,12 +119,25 @@ impl<const BLOCK: usize> Simplicial<BLOCK> {
         };
         let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let n = x.len();
-        LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
-            Conj::No,
+        let (x, stack) = (
             MatMut::from_column_major_slice_mut(x, n, 1),
-            Par::Seq,
             MemStack::new(&mut memory),
         );
+        if SIGNED {
+            LdltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
+                Conj::No,
+                x,
+                Par::Seq,
+                stack,
+            );
+        } else {
+            LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
+                Conj::No,
+                x,
+                Par::Seq,
+                stack,
+            );
+        }
     }
 
     /// How often a pattern was analysed.

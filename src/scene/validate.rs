@@ -69,10 +69,10 @@ impl Scene {
         let record = self.disks.record.to_string();
         let (field, value, why) = match self.model {
             Kind::MorseWitten => return Ok(()),
-            _ if newton => (
+            Kind::Disks if newton => (
                 "minimizer",
                 "fire+newton",
-                "Newton's method solves for the contact forces of Morse and Witten's droplets; take fire",
+                "Newton's method solves for the contact forces of droplets; take fire",
             ),
             _ if turning => (
                 "forces",

@@ -8,6 +8,7 @@ mod contact_law;
 mod crystal;
 mod edge_cases;
 mod foam;
+mod foam_newton;
 mod golden;
 mod gradient;
 mod matrix;

@@ -9,7 +9,7 @@
 //!
 //! with `Δf` eliminated: `J Δr = −F`, `J` being the derivative of the net forces with the contact problem solved inside
 //! (`linear.rs`). It is solved only as far as the step is worth (an inexact Newton method: R. S. Dembo, S. C. Eisenstat and
-//! T. Steihaug, SIAM J. Numer. Anal. 19, 400 (1982)), by GMRES (`gmres.rs`), preconditioned with the sparse Cholesky factor of the
+//! T. Steihaug, SIAM J. Numer. Anal. 19, 400 (1982)), by GMRES, preconditioned with the sparse Cholesky factor of the
 //! stiffness of independent contacts (`stiffness.rs`): 10 to 30 products at N = 256 and 1024. Then the contact problem is
 //! solved at the new positions from `f + Δf`, which is its answer to second order.
 //!
@@ -47,8 +47,8 @@
 //! overlaps carry the rounding of the positions (half a unit in the last place of the box's side, 4e-15 at N = 1024),
 //! whose forces do not balance better than some 1e-13.
 
-mod gmres;
-
+pub(crate) mod foam;
+mod step;
 mod stiffness;
 
 use crate::domain::Vec2;
@@ -59,9 +59,8 @@ use crate::models::droplet::linear::Linear;
 use crate::models::droplet::{MorseWitten, NetForces};
 use crate::numerics::exact_sum::sum_of_forces;
 use crate::state::Packing;
-pub(crate) use gmres::dot;
-use gmres::{Gmres, Report};
 
+use step::{GROWTH, KEPT, Step};
 pub(crate) use stiffness::Stiffness;
 
 /// How FIRE and Newton's method take turns: part of the minimiser's state.
@@ -116,14 +115,8 @@ const LONGEST_PAUSE: u32 = 2;
 /// N = 1024, five seeds, φ = 0.86: 2200, 2176 and 2014 with 2.6, 1.8 and 0.2.
 const SWITCH: f64 = 5e-4;
 
-/// A step is kept if it brings `|F|` to this fraction of what it was, or less.
-const KEPT: f64 = 0.5;
-
 /// How many attempts may fail to halve `|F|`, one after the other, before only halving counts.
 const PATIENCE: u32 = 6;
-
-/// A step that comes nearer is kept if `|F|` grows to this multiple at most.
-const GROWTH: f64 = 10.0;
 
 /// How often a step is computed anew on the contact set that the last one ran into. Of 88 steps that were kept in 32 runs at
 /// N = 1024, φ = 0.86, 74 were computed once, 11 twice, 3 three times and none four times.
@@ -133,9 +126,6 @@ const CORRECTIONS: u32 = 2;
 /// 40 such runs, steps into sets that differ in 1, 2, 3 and 4 contacts were kept in the end 10 of 13, 5 of 11, 3 of 7 and 0 of 5
 /// times.
 const MOST_EXCHANGED: usize = 3;
-
-/// The longest displacement of a particle in one step, in units of the smallest radius.
-const LONGEST: f64 = 0.1;
 
 /// What became of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,15 +142,10 @@ pub(crate) enum Attempt {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Newton {
     linear: Linear,
-    stiffness: Stiffness,
-    gmres: Gmres,
-    right: Vec<f64>,
-    step: Vec<f64>,
-    scratch: Vec<f64>,
+    step: Step,
     pairs: Vec<[u32; 2]>,
     forces: Vec<f64>,
     guess: Vec<f64>,
-    change: Vec<f64>,
     positions: Vec<Vec2>,
     net: Vec<Vec2>,
     piece: Vec<[u32; 2]>,
@@ -218,11 +203,11 @@ impl Newton {
             }
             self.piece.clear();
             self.piece.extend_from_slice(law.contacts().pairs);
-            let part = self.move_packing(packing);
+            let part = self.step.make(packing, &self.positions);
             self.guess.clear();
             let forces = law.contacts().forces.iter();
             self.guess
-                .extend(forces.zip(&self.change).map(|(f, df)| f + part * df));
+                .extend(forces.zip(&self.step.change).map(|(f, df)| f + part * df));
             if !self.settle(packing, law) {
                 break;
             }
@@ -231,7 +216,8 @@ impl Newton {
                 return Attempt::Halved;
             }
             let exchanged = exchanged(&self.piece, law.contacts().pairs);
-            if patient && exchanged == 0 && self.is_nearer(net, before) {
+            let is_near = length(&self.net) <= GROWTH * before;
+            if patient && exchanged == 0 && is_near && self.step.is_nearer(net, &self.net) {
                 return Attempt::Nearer;
             }
             packing.positions_mut().copy_from_slice(&self.positions);
@@ -249,43 +235,6 @@ impl Newton {
         packing.positions_mut().copy_from_slice(&self.positions);
         law.restore(packing, &self.pairs, &self.forces);
         Attempt::GivenUp
-    }
-
-    /// Whether the net forces at the end of a step stand for half the distance of those at its start, or less, measured by
-    /// the stiffness of the step: `|K̃⁻¹ F|`.
-    ///
-    /// Along a soft mode a small force means a long way, and going it leaves forces of second order in stiff directions,
-    /// which are large and mean next to nothing (P. Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, calls such a
-    /// test natural).
-    fn is_nearer(&mut self, net: &[Vec2], before: f64) -> bool {
-        if length(&self.net) > GROWTH * before {
-            return false;
-        }
-        let stiffness = &self.stiffness;
-        let scratch = &mut self.scratch;
-        let mut distance = |forces: &[Vec2]| {
-            scratch.clear();
-            scratch.extend(forces.iter().flat_map(|f| [f.x, f.y]));
-            stiffness.solve(scratch);
-            gmres::norm(scratch)
-        };
-        let start = distance(net);
-        distance(&self.net) <= KEPT * start
-    }
-
-    /// Moves the particles from `positions` by `step`, shortened if it is too long; returns the part of it that was made.
-    fn move_packing(&self, packing: &mut Packing) -> f64 {
-        let steps = self.step.as_chunks::<2>().0;
-        let squared = steps
-            .iter()
-            .fold(0.0, |m: f64, [x, y]| m.max(x * x + y * y));
-        let part = (LONGEST * packing.smallest_radius() / squared.sqrt()).min(1.0);
-        let domain = packing.domain();
-        let moved = packing.positions_mut().iter_mut().zip(&self.positions);
-        for ((x, old), s) in moved.zip(steps) {
-            *x = domain.wrap(old + Vec2::new(s[0], s[1]) * part);
-        }
-        part
     }
 
     /// The contact law at the positions of `packing`, from the contacts of `piece` with the forces of `guess`; `false` if
@@ -323,8 +272,7 @@ impl Newton {
         solved.is_ok()
     }
 
-    /// The displacements into `step` and the change of the forces into `change`, from the contacts of `law`, whose net
-    /// forces are in `net`; `false` where there is no step worth trying.
+    /// The step from the contacts of `law`, whose net forces are in `net`; `false` where there is none worth trying.
     fn propose(
         &mut self,
         packing: &Packing,
@@ -333,65 +281,12 @@ impl Newton {
         (f_max, goal): (f64, f64),
     ) -> bool {
         let contacts = law.contacts();
-        if contacts.pairs.is_empty() || contacts.distances.contains(&0.0) {
-            return false;
-        }
-        let compliances = law.matrix().diagonal();
-        if self
-            .stiffness
-            .rebuild(&contacts, compliances, packing.len(), 0.0)
-            .is_err()
-        {
-            return false;
-        }
-        self.right.clear();
-        self.right
-            .extend(self.net.iter().flat_map(|f| [-f.x, -f.y]));
         let mut linear = self.linear.at(form.form(), law, packing);
-        if !linear.correct(&mut self.right, &mut self.change) {
-            return false;
-        }
-        // What is left of |F| behind a full step is O(|F|²): solving the linear problem further than that is in vain, and
-        // so is a result far below the goal.
-        let mean = contacts.forces.iter().sum::<f64>() / contacts.forces.len() as f64;
-        let quadratic = 10.0 * f_max * law.line_tension() / mean;
-        let tolerance = quadratic.max(0.1 * goal / f_max).clamp(1e-10, 1e-2);
-        let n = self.right.len();
-        self.step.resize(n, 0.0);
-        self.scratch.resize(n, 0.0);
-        let (stiffness, scratch) = (&self.stiffness, &mut self.scratch);
-        let Some(Report { residual, .. }) = self.gmres.solve(
-            &self.right,
-            &mut self.step,
-            tolerance,
-            MOST_PRODUCTS,
-            |v, w, accuracy| {
-                scratch.copy_from_slice(v);
-                stiffness.solve(scratch);
-                linear.product(scratch, w, accuracy)
-            },
-        ) else {
-            return false;
-        };
-        stiffness.solve(&mut self.step);
-        let downhill: f64 = self.right.iter().zip(&self.step).map(|(b, x)| -b * x).sum();
-        // A NaN is no step either.
-        let worth_trying = residual <= KEPT && downhill > 0.0;
-        if !worth_trying {
-            return false;
-        }
-        if !linear.forces(&self.step, 1e-8) {
-            return false;
-        }
-        for (total, df) in self.change.iter_mut().zip(linear.change()) {
-            *total += df;
-        }
-        true
+        let given = (&contacts, law.matrix().diagonal());
+        let goal = (f_max, goal, law.line_tension());
+        self.step.find(&mut linear, given, &self.net, goal)
     }
 }
-
-/// Products with `J` in one step.
-const MOST_PRODUCTS: usize = 100;
 
 /// The residual of the contact law, relative to the largest overlap, below which forces are taken as they are.
 const EXACT: f64 = 1e-12;

@@ -27,6 +27,22 @@ use crate::models::droplet::turning::Turning;
 use crate::models::droplet::{Form, tangent};
 use crate::state::Packing;
 
+/// A linearised problem: how net forces answer to displacements, two numbers a particle, when all else follows.
+pub(crate) trait Linearised {
+    /// Subtracts from `right` what the net forces change by when what follows is put right where it is, and puts that correction into `miss`;
+    /// `false` if it cannot be had.
+    fn correct(&mut self, right: &mut [f64], miss: &mut Vec<f64>) -> bool;
+
+    /// `y = J x`, right to `accuracy` (relative); `false` if it cannot be had.
+    fn product(&mut self, x: &[f64], y: &mut [f64], accuracy: f64) -> bool;
+
+    /// By how much what follows changes with displacements `x`, right to `accuracy` (relative); `false` if it cannot be had.
+    fn follow(&mut self, x: &[f64], accuracy: f64) -> bool;
+
+    /// What [`follow`](Self::follow) found last.
+    fn change(&self) -> &[f64];
+}
+
 /// The buffers of the products.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Linear {
@@ -74,7 +90,7 @@ impl Linear {
 impl At<'_> {
     /// `df` of the displacements `x` (two a particle), with `A df` right to `tolerance` times its largest entry; `false`
     /// if that cannot be had.
-    pub(crate) fn forces(&mut self, x: &[f64], tolerance: f64) -> bool {
+    fn forces(&mut self, x: &[f64], tolerance: f64) -> bool {
         let b = &mut *self.buffers;
         b.stretch.clear();
         b.turn.clear();
@@ -104,13 +120,24 @@ impl At<'_> {
         )
     }
 
-    /// The `df` that [`forces`](Self::forces) found last.
-    pub(crate) fn change(&self) -> &[f64] {
-        &self.buffers.change
+    /// Adds `sign` times what acts along the normals and across them to the particles.
+    fn add_forces(&self, sign: f64, y: &mut [f64]) {
+        let b = &*self.buffers;
+        for (c, &[i, j]) in self.contacts.pairs.iter().enumerate() {
+            let (i, j) = (2 * i as usize, 2 * j as usize);
+            let n = self.contacts.normals[c];
+            let f = n * b.along[c] + tangent(n) * (b.across[c] / self.contacts.distances[c]);
+            let f = f * sign;
+            y[i] += f.x;
+            y[i + 1] += f.y;
+            y[j] -= f.x;
+            y[j + 1] -= f.y;
+        }
     }
+}
 
-    /// `y = J x`, the contact problem in it solved as by [`forces`](Self::forces).
-    pub(crate) fn product(&mut self, x: &[f64], y: &mut [f64], tolerance: f64) -> bool {
+impl Linearised for At<'_> {
+    fn product(&mut self, x: &[f64], y: &mut [f64], tolerance: f64) -> bool {
         if !self.forces(x, tolerance) {
             return false;
         }
@@ -135,9 +162,8 @@ impl At<'_> {
         true
     }
 
-    /// Takes `−A⁻¹ (A f − δ)`, by which the forces at hand miss the contact problem, into account: subtracts what it does to
-    /// the net forces from `right` and puts it into `miss`. `false` if it cannot be had.
-    pub(crate) fn correct(&mut self, right: &mut [f64], miss: &mut Vec<f64>) -> bool {
+    /// What follows is forces: those at hand miss the contact problem by `−A⁻¹ (A f − δ)`.
+    fn correct(&mut self, right: &mut [f64], miss: &mut Vec<f64>) -> bool {
         let b = &mut *self.buffers;
         let forces = self.contacts.forces;
         b.right.clear();
@@ -164,19 +190,12 @@ impl At<'_> {
         true
     }
 
-    /// Adds `sign` times what acts along the normals and across them to the particles.
-    fn add_forces(&self, sign: f64, y: &mut [f64]) {
-        let b = &*self.buffers;
-        for (c, &[i, j]) in self.contacts.pairs.iter().enumerate() {
-            let (i, j) = (2 * i as usize, 2 * j as usize);
-            let n = self.contacts.normals[c];
-            let f = n * b.along[c] + tangent(n) * (b.across[c] / self.contacts.distances[c]);
-            let f = f * sign;
-            y[i] += f.x;
-            y[i + 1] += f.y;
-            y[j] -= f.x;
-            y[j + 1] -= f.y;
-        }
+    fn follow(&mut self, x: &[f64], accuracy: f64) -> bool {
+        self.forces(x, accuracy)
+    }
+
+    fn change(&self) -> &[f64] {
+        &self.buffers.change
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::common::scene;
 use softjam::models::{Kind, Model};
 use softjam::protocol::{RelaxError, Relaxation, Status};
-use softjam::scene::{Radii, Scene, Species};
+use softjam::scene::{Minimizer, Radii, Scene, Species};
 use softjam::state::{Frame, FrameError};
 
 const KINDS: [Kind; 2] = [Kind::RoundedPolygon, Kind::WetFoam];
@@ -74,16 +74,33 @@ fn run_of_droplets_taken_up_at_any_frame_walks_the_same_bits() {
         },
     ];
     for scene in scenes {
-        for model in KINDS {
+        for (model, minimizer) in [
+            (Kind::RoundedPolygon, Minimizer::Fire),
+            (Kind::WetFoam, Minimizer::Fire),
+            (Kind::RoundedPolygon, Minimizer::FireNewton),
+            (Kind::WetFoam, Minimizer::FireNewton),
+        ] {
             let scene = Scene {
                 model,
+                minimizer,
                 ..scene.clone()
             };
             let run = Relaxation::new(&scene).unwrap();
             let packing = run.packing().clone();
             let frames: Vec<Frame> = run.map(Result::unwrap).collect();
             let last = frames.len() - 1;
-            for k in [0, 1, 2, 49, 50, last / 2, last - 1, last] {
+            for k in [
+                0,
+                1,
+                2,
+                49,
+                50,
+                last / 2,
+                last - 3,
+                last - 2,
+                last - 1,
+                last,
+            ] {
                 let resumed = Relaxation::resume(&scene, packing.clone(), frames[k].clone());
                 let rest: Vec<Frame> = resumed.unwrap().map(Result::unwrap).collect();
                 assert_eq!(rest.len(), frames.len() - k, "{model:?} from step {k}");
@@ -130,7 +147,7 @@ fn tight_starts_end_with_a_packing_or_a_reason() {
         // No droplets fit into less than their own area.
         let scene = Scene {
             model,
-            steps: 300,
+            steps: 60,
             ..scene(24, 1.2, 1)
         };
         match Relaxation::new(&scene) {

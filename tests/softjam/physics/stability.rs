@@ -9,7 +9,7 @@ use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
 use softjam::state::Packing;
 
-fn to_its_end(run: &mut Relaxation) {
+pub fn to_its_end(run: &mut Relaxation) {
     while run.status() == Status::Running {
         run.advance().unwrap();
     }
@@ -58,7 +58,7 @@ fn samples_near_jamming_are_judged_as_their_eigenvalues_say() {
 }
 
 /// Disks of radius 1/2 on a square lattice of spacing `a`, `columns` × `rows`, in a box of sides `columns a` and `height`.
-fn square(columns: usize, rows: usize, a: f64, sides: Vec2) -> Packing {
+pub fn square(columns: usize, rows: usize, a: f64, sides: Vec2) -> Packing {
     let place = |k: usize| {
         let (x, y) = (k % columns, k / columns);
         Vec2::new((x as f64 + 0.5) * a, (y as f64 + 0.5) * a)

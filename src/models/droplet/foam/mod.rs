@@ -34,6 +34,7 @@
 mod check;
 mod contact_problem;
 mod film;
+pub(crate) mod linear;
 mod lines;
 mod model;
 mod outline;
@@ -52,6 +53,7 @@ use crate::domain::Vec2;
 use crate::neighbors::NeighborList;
 use crate::state::{Packing, unit_and_length};
 use contact_problem::Steps;
+use linear::Linear;
 use lines::{Lines, REACH};
 use state::State;
 
@@ -277,6 +279,60 @@ impl Foam {
                 break;
             }
         }
+        Ok(())
+    }
+
+    /// Whether contacts were made soft.
+    pub(crate) fn is_soft(&self) -> bool {
+        self.state.give() > 0.0
+    }
+
+    /// The moments `f T` of the contacts, which vanish in balance (γ·length).
+    pub(crate) fn moments_left(&self) -> impl Iterator<Item = f64> {
+        let bearing = self.state.loads().iter().enumerate();
+        bearing
+            .filter(|(_, load)| **load > 0.0)
+            .map(|(c, load)| load * self.state.moment_arm(&self.lines, c))
+    }
+
+    /// Moves on to the positions of `packing`, a part of the way that `change` leads by the linearised problem, and solves the contact problem
+    /// there unless the forces fulfil it as they come.
+    pub(crate) fn follow(
+        &mut self,
+        packing: &Packing,
+        linear: &Linear,
+        change: &[f64],
+        part: f64,
+    ) -> Result<(), ContactError> {
+        let before = self.lines.clone();
+        let mut turned = self.tilts.clone();
+        tilts::step(&self.lines, &self.state, &mut self.tilts);
+        let bearing = self.forces.iter().enumerate().filter(|(_, f)| **f > 0.0);
+        let bearing: Vec<usize> = bearing.map(|(c, _)| c).collect();
+        for (number, &c) in bearing.iter().enumerate() {
+            let [turn, load] = linear.change_of_contact(change, number);
+            turned[c] += part * turn;
+            let f = self.forces[c] + part * load * self.line_tension;
+            self.forces[c] = f.max(0.0);
+        }
+        let dents = self
+            .state
+            .dents()
+            .iter()
+            .zip(linear.change_of_radii(change));
+        let dents: Vec<f64> = dents.map(|(d, r)| d - part * r).collect();
+        self.state.set_dents(&dents);
+        self.set_lines(packing);
+        for c in bearing {
+            // The normal is what was changed: the tilt is what it has beside the line of centres.
+            if let Ok(now) = self.lines.pairs().binary_search(&before.pairs()[c]) {
+                let (old, new) = (before.between(c), self.lines.between(now));
+                self.tilts[now] = turned[c] - libm::atan2(old.perp(&new), old.dot(&new));
+            }
+        }
+        let tolerance = self.due(packing, 0.0);
+        self.find_forces(packing, tolerance)?;
+        self.balance(packing);
         Ok(())
     }
 

@@ -106,15 +106,7 @@ impl Model for Foam {
 
     /// The largest `f |T|`.
     fn moment(&self) -> f64 {
-        let moments = self.state.loads().iter().enumerate().map(|(c, load)| {
-            let arm = if *load > 0.0 {
-                self.state.moment_arm(&self.lines, c)
-            } else {
-                0.0
-            };
-            (load * arm).abs()
-        });
-        moments.fold(0.0, f64::max)
+        self.moments_left().fold(0.0, |m: f64, x| m.max(x.abs()))
     }
 
     fn contacts<'a>(&'a self, _: &Packing) -> Contacts<'a> {
