@@ -24,8 +24,9 @@
 //! # for name in ["a.rrd", "b.mcap", "c.rrd"] { std::fs::remove_file(path(name)).unwrap(); }
 //! ```
 
-use crate::analysis::{METRICS, Metrics};
+use crate::analysis::{METRICS, Metrics, metrics_of};
 use crate::minimize::dt_and_time;
+use crate::models::Kind;
 use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{
     Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
@@ -144,6 +145,7 @@ pub fn convert(
         first: recording.from_step(),
         has_states: recording.scene().channels.state.is_on(),
         stage: 0,
+        model: recording.scene().model,
         waiting: BTreeMap::new(),
         last: None,
         rebuilt: 0,
@@ -199,8 +201,9 @@ struct Conversion {
     first: u64,
     /// Whether there are states to wait for.
     has_states: bool,
-    /// The stage of the last recorded frame.
+    /// The stage of the last recorded frame, and its model; that of the scene before the first.
     stage: u32,
+    model: Kind,
     /// Metrics of steps that are not written yet.
     waiting: BTreeMap<u64, Row>,
     /// The last recorded frame; not written yet, since the last of all is written by every channel.
@@ -216,12 +219,11 @@ struct Row {
 }
 
 impl Row {
-    fn whole(&self) -> Option<Metrics> {
-        let mut metrics = [0.0; METRICS.len()];
-        for (metric, value) in metrics.iter_mut().zip(self.values) {
-            *metric = value?;
-        }
-        Some(metrics)
+    /// The metrics, if all are there that `model` has.
+    fn whole(&self, model: Kind) -> Option<Metrics> {
+        let mut had = self.values.iter().zip(metrics_of(model));
+        had.all(|(value, has)| value.is_some() || !has)
+            .then_some(self.values)
     }
 }
 
@@ -285,7 +287,8 @@ impl Conversion {
         }
         let mut step = asks(metrics);
         while let Some(k) = step.filter(|k| *k < until) {
-            if self.waiting.get(&k).and_then(Row::whole).is_none() {
+            let row = self.waiting.get(&k);
+            if row.and_then(|row| row.whole(self.model)).is_none() {
                 return true;
             }
             step = metrics.after(k);
@@ -338,7 +341,9 @@ impl Conversion {
         let edge = last || step == self.first || begins_stage;
         let channels = recording.scene().scheduled(&self.channels, frame.stage);
         let [contours, contacts, metrics, state] = channels.at(step, edge);
-        let row = self.waiting.get(&step).and_then(Row::whole);
+        self.model = recording.scene().stage(frame.stage).model;
+        let row = self.waiting.get(&step);
+        let row = row.and_then(|row| row.whole(self.model));
         let metrics = match (metrics, row) {
             (false, _) => None,
             (true, Some(recorded)) => Some(recorded),
@@ -366,7 +371,8 @@ impl Conversion {
 
     /// Writes the metrics of a step that has no recorded frame.
     fn write_row(&mut self, step: u64, row: Row) -> Result<(), ConvertError> {
-        let metrics = row.whole().filter(|_| self.channels.metrics.includes(step));
+        let metrics = row.whole(self.model);
+        let metrics = metrics.filter(|_| self.channels.metrics.includes(step));
         if metrics.is_some() {
             self.writer.send(Snapshot {
                 step,
@@ -385,7 +391,7 @@ impl Conversion {
     /// Writes the metrics that are whole, where there are no states to wait for.
     fn write_whole_rows(&mut self) -> Result<(), ConvertError> {
         while let Some(entry) = self.waiting.first_entry()
-            && let Some(metrics) = entry.get().whole()
+            && let Some(metrics) = entry.get().whole(self.model)
         {
             let (step, row) = entry.remove_entry();
             self.writer.send(Snapshot {

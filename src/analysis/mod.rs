@@ -25,6 +25,8 @@ mod stability;
 mod sums;
 
 pub use frame_forces::FrameForces;
+#[cfg(feature = "recording")]
+pub(crate) use observables::metrics_of;
 pub use observables::{METRICS, Metrics, Observables};
 pub use rattlers::{Backbone, backbone, held};
 pub use stability::Stability;

@@ -4,13 +4,13 @@ use super::{Backbone, sums::Sums};
 use crate::contacts::Contacts;
 use crate::domain::Domain;
 use crate::models::droplet::contact::ContactLaw;
-use crate::models::{AnyModel, Model};
+use crate::models::{AnyModel, Kind, Model};
 use crate::state::Packing;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
 ///
 /// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
-pub const METRICS: [&str; 9] = [
+pub const METRICS: [&str; 10] = [
     "f_max",
     "log10_f_max",
     "energy",
@@ -20,10 +20,17 @@ pub const METRICS: [&str; 9] = [
     "rattlers",
     "dt",
     "stress_xy",
+    "moment",
 ];
 
-/// The values of [`METRICS`].
-pub type Metrics = [f64; METRICS.len()];
+/// The values of [`METRICS`]; none where a model has no such number.
+pub type Metrics = [Option<f64>; METRICS.len()];
+
+/// Which of the [`METRICS`] a model has.
+#[cfg(feature = "recording")]
+pub(crate) fn metrics_of(model: Kind) -> [bool; METRICS.len()] {
+    METRICS.map(|name| name != "moment" || model.balances_moments())
+}
 
 /// What a frame is worth in numbers, all in units of the line tension γ: they do not depend on its value.
 ///
@@ -58,6 +65,8 @@ pub struct Observables {
     pub rattlers: usize,
     /// The minimiser's time step.
     pub dt: f64,
+    /// The largest moment `f |T|` of a contact (γ·length), where moments are balanced beside forces.
+    pub moment: Option<f64>,
 }
 
 impl Observables {
@@ -141,6 +150,7 @@ impl Observables {
             return Self {
                 energy: foam.energy(),
                 stress: foam.moments().map(|sum| (0.0 - sum) / scale),
+                moment: Some(foam.moment()),
                 ..o
             };
         };
@@ -221,15 +231,16 @@ impl Observables {
     #[must_use]
     pub fn metrics(&self) -> Metrics {
         [
-            self.f_max,
-            libm::log10(self.f_max.max(1e-18)),
-            self.energy,
-            self.pressure(),
-            self.coordination(),
-            self.contacts as f64,
-            self.rattlers as f64,
-            self.dt,
-            self.stress[1],
+            Some(self.f_max),
+            Some(libm::log10(self.f_max.max(1e-18))),
+            Some(self.energy),
+            Some(self.pressure()),
+            Some(self.coordination()),
+            Some(self.contacts as f64),
+            Some(self.rattlers as f64),
+            Some(self.dt),
+            Some(self.stress[1]),
+            self.moment,
         ]
     }
 

@@ -162,7 +162,11 @@ impl SceneFlags {
     }
 
     /// The scene of these fields, overridden by the flags.
-    pub fn scene_over(&self, file: SceneFields) -> anyhow::Result<Scene> {
+    pub fn scene_over(&self, mut file: SceneFields) -> anyhow::Result<Scene> {
+        if self.model.is_some_and(|model| Some(model) != file.model) {
+            // The form of the forces is that of a model.
+            file.forces = None;
+        }
         let channels = self.channels.over(file.channels.unwrap_or_default())?;
         let contours = self.vertices.map(|vertices| {
             let mut style = file.contours.unwrap_or_default();

@@ -234,7 +234,7 @@ fn text(path: &str, recording: &Recording, found: &Findings) -> String {
     if from > 0 {
         let changed = recording.legs().iter().any(|leg| leg.changes(scene));
         let how = if changed {
-            ", there or before with another threshold, minimiser or forces"
+            ", there or before with another model, threshold, minimiser or forces"
         } else {
             ""
         };

@@ -43,7 +43,7 @@ pub struct Arguments {
     scene: SceneFlags,
 
     /// Go on from a recorded frame of an earlier run, exactly as that run did or would have done; with another --threshold,
-    /// --minimizer or --forces from what these make of the frame.
+    /// --minimizer or --forces from what these make of the frame, with another --model from its positions.
     #[arg(
         long,
         value_name = "RUN.rrd",

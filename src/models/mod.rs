@@ -202,6 +202,12 @@ impl Kind {
         self.films().is_some()
     }
 
+    /// Whether moments of contacts have to be balanced beside forces.
+    #[cfg(feature = "recording")]
+    pub(crate) fn balances_moments(self) -> bool {
+        self.films().is_some()
+    }
+
     /// The name in scenes.
     #[must_use]
     pub fn name(self) -> &'static str {

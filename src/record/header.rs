@@ -161,7 +161,7 @@ fn text(header: &Header) -> String {
             if header.legs.is_empty() {
                 ""
             } else {
-                ", to which another threshold, minimiser or form of the forces led"
+                ", to which another model, threshold, minimiser or form of the forces led"
             }
         ),
     };

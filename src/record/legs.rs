@@ -1,9 +1,10 @@
 //! What a run went by before its scene was changed on the way.
 
+use crate::models::Kind;
 use crate::models::droplet::Form;
 use crate::scene::{Minimizer, Scene};
 
-/// A stretch of a run up to a step at which it was taken up with another threshold, minimiser or form of the forces.
+/// A stretch of a run up to a step at which it was taken up with another model, threshold, minimiser or form of the forces.
 ///
 /// ```
 /// use softjam::{record::Leg, scene::Scene};
@@ -24,6 +25,8 @@ pub struct Leg {
     pub minimizer: Minimizer,
     /// Its forces.
     pub forces: Form,
+    /// Its model; that of the scene where none is named.
+    pub model: Option<Kind>,
 }
 
 impl Leg {
@@ -35,13 +38,23 @@ impl Leg {
             threshold: scene.threshold,
             minimizer: scene.minimizer,
             forces: scene.forces,
+            model: Some(scene.model),
+        }
+    }
+
+    /// The leg in a run whose scene was of `model` so far.
+    #[must_use]
+    pub fn of_model(self, model: Kind) -> Self {
+        Self {
+            model: self.model.or(Some(model)),
+            ..self
         }
     }
 
     /// Whether a run of `scene` has other frames.
     #[must_use]
     pub fn changes(&self, scene: &Scene) -> bool {
-        *self != Self::of(scene, self.until)
+        self.of_model(scene.model) != Self::of(scene, self.until)
     }
 
     /// The scene of the stretch in a run that ends as one of `scene`, without its step limit.
@@ -51,6 +64,7 @@ impl Leg {
             threshold: self.threshold,
             minimizer: self.minimizer,
             forces: self.forces,
+            model: self.model.unwrap_or(scene.model),
             steps: u64::MAX,
             ..scene.clone()
         }
@@ -112,6 +126,11 @@ mod tests {
         ];
         let text = to_text(&legs).unwrap().unwrap();
         assert_eq!(from_text(&text, 9), Ok(legs.to_vec()));
+        // Those of older recordings name no model.
+        let older = text.replace("model = \"morse-witten\"\n", "");
+        let read = from_text(&older, 9).unwrap();
+        assert!(read[0].model.is_none() && read[0].of_model(Kind::MorseWitten) == legs[0]);
+        assert_eq!(read[1].scene(&scene).model, scene.model);
         assert_eq!(to_text(&[]).unwrap(), None);
         assert!(from_text(&text, 8).is_err(), "behind the first step");
         let swapped = to_text(&[legs[2], legs[0]]).unwrap().unwrap();

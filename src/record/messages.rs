@@ -57,6 +57,8 @@ pub(crate) struct MetricsMessage {
     pub dt: Option<f64>,
     #[prost(double, optional, tag = "11")]
     pub stress_xy: Option<f64>,
+    #[prost(double, optional, tag = "12")]
+    pub moment: Option<f64>,
 }
 
 impl MetricsMessage {
@@ -71,7 +73,8 @@ impl MetricsMessage {
             rattlers,
             dt,
             stress_xy,
-        ] = metrics.map(Some);
+            moment,
+        ] = metrics;
         Self {
             step,
             sim_time_ns: Some(nanoseconds),
@@ -84,11 +87,12 @@ impl MetricsMessage {
             rattlers,
             dt,
             stress_xy,
+            moment,
         }
     }
 
     /// The values in the order of [`METRICS`](crate::analysis::METRICS).
-    pub fn values(&self) -> [Option<f64>; 9] {
+    pub fn values(&self) -> Metrics {
         [
             self.f_max,
             self.log10_f_max,
@@ -99,6 +103,7 @@ impl MetricsMessage {
             self.rattlers,
             self.dt,
             self.stress_xy,
+            self.moment,
         ]
     }
 }

@@ -209,10 +209,16 @@ impl<W: Write> Chunks<W> {
         if rows.is_empty() {
             return Ok(());
         }
-        let times: Vec<(u64, i64)> = rows.iter().map(|row| (row.0, row.1)).collect();
         for (k, name) in METRICS.into_iter().enumerate() {
-            let values = Float64Array::from_iter_values(rows.iter().map(|r| r.2[k]));
-            let each = OffsetBuffer::from_lengths(core::iter::repeat_n(1, rows.len()));
+            let of_metric = rows
+                .iter()
+                .filter_map(|row| Some((row.0, row.1, row.2[k]?)));
+            let times: Vec<(u64, i64)> = of_metric.clone().map(|row| (row.0, row.1)).collect();
+            if times.is_empty() {
+                continue;
+            }
+            let values = Float64Array::from_iter_values(of_metric.map(|row| row.2));
+            let each = OffsetBuffer::from_lengths(core::iter::repeat_n(1, times.len()));
             let column = lists(each, array(values));
             let columns = vec![(Scalars::descriptor_scalars(), column)];
             self.write_columns(&format!("/metrics/{name}"), &times, columns)?;

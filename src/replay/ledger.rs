@@ -140,14 +140,13 @@ impl Ledger {
             self.found.remove(&early);
         }
         let found = self.found.remove(&step).unwrap_or_default();
-        let expected: Option<analysis::Metrics> = snapshot.metrics;
+        let expected: analysis::Metrics = snapshot.metrics.unwrap_or_default();
         let mut missing = Values::default();
-        for (k, found) in found.into_iter().enumerate() {
+        for (k, (found, expected)) in found.into_iter().zip(expected).enumerate() {
             match (found, expected) {
-                (Some(found), Some(expected)) => self.compare(step, k, found, expected[k]),
-                (None, Some(expected)) => missing[k] = Some(expected[k]),
+                (Some(found), Some(expected)) => self.compare(step, k, found, expected),
                 (Some(_), None) => self.row(step, k, Row::NotAsked),
-                (None, None) => {}
+                (None, expected) => missing[k] = expected,
             }
         }
         if missing.iter().any(Option::is_some) {

@@ -165,7 +165,8 @@ fn first_run(
         return Ok(Err(Difference { step, what }));
     }
     let mut scenes = legs.iter().map(|leg| leg.scene(scene));
-    let mut run = Relaxation::new(&scenes.next().unwrap_or(scene.clone()))?;
+    let mut now = scenes.next().unwrap_or(scene.clone());
+    let mut run = Relaxation::new(&now)?;
     let numbers = |packing: &Packing| {
         let l = packing.domain().lengths();
         let mut numbers = vec![l.x, l.y];
@@ -189,7 +190,8 @@ fn first_run(
             run.advance()?;
         }
         let next = scenes.next().unwrap_or(scene.clone());
-        run = Relaxation::take_over(&next, run.packing().clone(), run.frame())?;
+        run = Relaxation::take_over(&now, &next, run.packing().clone(), run.frame())?;
+        now = next;
     }
     Ok(Ok(run))
 }

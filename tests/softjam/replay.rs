@@ -160,7 +160,7 @@ fn forged_metrics_forces_and_minimisers_are_found_in_either_way() {
         ("metric pressure", |s| {
             // The pressure is the fourth of the metrics.
             if let Some(metrics) = s.metrics.as_mut().filter(|_| s.step == 33) {
-                metrics[3] = metrics[3].next_up();
+                metrics[3] = metrics[3].map(f64::next_up);
             }
         }),
         ("force of contact 5", |s| {
@@ -210,6 +210,7 @@ fn frames_of_large_and_small_particles_are_in_balance() {
         let metrics: Vec<_> = METRICS
             .into_iter()
             .zip(run.observables().metrics())
+            .filter_map(|(name, value)| Some((name, value?)))
             .collect();
         balance.check(run.packing(), &run.frame(), &metrics);
     }

@@ -31,8 +31,8 @@ enum First {
     Frame {
         packing: Packing,
         frame: Box<Frame>,
-        /// Whether the scene is changed at the frame.
-        changed: bool,
+        /// The scene before, if it is changed at the frame.
+        before: Option<Scene>,
     },
 }
 
@@ -115,7 +115,10 @@ impl Origin {
         let packing = recording.packing(&frame)?;
         let leg = Leg::of(recording.scene(), frame.step);
         let changed = leg.changes(&scene);
-        let legs = recording.legs().iter().copied();
+        let legs = recording
+            .legs()
+            .iter()
+            .map(|leg| leg.of_model(recording.scene().model));
         let legs = legs.chain(changed.then_some(leg)).collect();
         if scene.steps < frame.step {
             let allowed = format!("steps ≥ {}, the step that the run goes on from", frame.step);
@@ -125,7 +128,7 @@ impl Origin {
         let first = First::Frame {
             packing,
             frame,
-            changed,
+            before: changed.then(|| recording.scene().clone()),
         };
         Ok(Self { scene, legs, first })
     }
@@ -150,19 +153,18 @@ impl Origin {
 
     pub(super) fn run(self) -> anyhow::Result<Relaxation> {
         let scene = &self.scene;
-        let (packing, frame, changed) = match self.first {
+        let (packing, frame, before) = match self.first {
             First::Scene => return Ok(Relaxation::new(scene)?),
             First::File(packing) => return Ok(Relaxation::of_start(scene, packing)?),
             First::Frame {
                 packing,
                 frame,
-                changed,
-            } => (packing, *frame, changed),
+                before,
+            } => (packing, *frame, before),
         };
-        let run = if changed {
-            Relaxation::take_over(scene, packing, frame)?
-        } else {
-            Relaxation::resume(scene, packing, frame)?
+        let run = match before {
+            Some(before) => Relaxation::take_over(&before, scene, packing, frame)?,
+            None => Relaxation::resume(scene, packing, frame)?,
         };
         // Its replay would have nothing to run.
         if run.status() != Status::Running && scene.starts_from_file() {

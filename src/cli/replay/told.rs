@@ -72,7 +72,7 @@ impl Findings {
         let legs = legs.map(|leg| {
             let (until, threshold) = (leg.until, leg.threshold);
             format!(
-                " (to step {until} with the threshold {threshold:e}, the minimiser and the forces of before)"
+                " (to step {until} with the threshold {threshold:e}, the model, minimiser and forces of before)"
             )
         });
         let legs = legs.collect::<Vec<_>>().concat();

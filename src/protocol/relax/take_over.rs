@@ -1,17 +1,18 @@
 //! A run that goes on under another scene.
 
 use super::{RelaxError, Relaxation};
+use crate::minimize::dt_and_time;
 use crate::models::{Goal, Model};
 use crate::scene::Scene;
 use crate::state::Frame;
 use crate::state::Packing;
 
 impl Relaxation {
-    /// Goes on under `scene` from a frame of a run of another, which differs in its threshold, its minimiser or its form of the forces
-    /// alone.
+    /// Goes on under `scene` from a frame of a run of `before`, which differs in its model, its threshold, its minimiser or its form of the
+    /// forces alone.
     ///
     /// The frame becomes what `scene` computes from it: its contact problem is solved on, where `scene` asks for more at the `f_max` of
-    /// its own forces. From there on [`resume`](Self::resume) walks the same bits.
+    /// its own forces. Under another model nothing but the positions stays, and the minimiser starts at rest. From there on [`resume`](Self::resume) walks the same bits.
     ///
     /// # Errors
     ///
@@ -25,12 +26,29 @@ impl Relaxation {
     /// while run.f_max() > 1e-4 {
     ///     run.advance().unwrap();
     /// }
-    /// let rough = Scene { threshold: 1e-3, ..scene };
-    /// let run = Relaxation::take_over(&rough, run.packing().clone(), run.frame()).unwrap();
+    /// let rough = Scene { threshold: 1e-3, ..scene.clone() };
+    /// let run = Relaxation::take_over(&scene, &rough, run.packing().clone(), run.frame()).unwrap();
     /// assert_eq!(run.status(), Status::Converged);
     /// ```
-    pub fn take_over(scene: &Scene, packing: Packing, frame: Frame) -> Result<Self, RelaxError> {
+    pub fn take_over(
+        before: &Scene,
+        scene: &Scene,
+        mut packing: Packing,
+        mut frame: Frame,
+    ) -> Result<Self, RelaxError> {
         let step = frame.step;
+        let stages = [before, scene].map(|scene| scene.stage(frame.stage));
+        if stages[0].model != stages[1].model {
+            scene.validate()?;
+            frame.validate(packing.len(), packing.domain())?;
+            let (_, time) = dt_and_time(&frame.minimizer);
+            *packing.positions_mut() = core::mem::take(&mut frame.positions);
+            let run = Self::begin(&stages[1], packing, (step, time))?;
+            return Ok(Self {
+                stage: frame.stage,
+                ..run
+            });
+        }
         let mut run = Self::resume(scene, packing, frame)?;
         if run.model.residual() > run.promised_residual() {
             run.model

@@ -4,7 +4,7 @@ use super::stability::{square, to_its_end};
 use crate::common::scene;
 use nalgebra::DMatrix;
 use softjam::analysis::Stability;
-use softjam::domain::Vec2;
+use softjam::domain::{Domain, Vec2};
 use softjam::models::{Goal, Kind, Model};
 use softjam::protocol::{Relaxation, Status};
 use softjam::scene::{Minimizer, Scene};
@@ -123,6 +123,39 @@ fn square_lattice_of_droplets_is_a_saddle_and_is_left() {
             assert_eq!(run.status(), Status::Converged);
             assert_ne!(run.stability(), Some(Stability::Saddle));
             assert!(run.observables().energy < energy);
+        }
+    }
+}
+
+/// Positions and box shrunk to another coverage.
+fn compressed(packing: &Packing, phi: f64) -> Packing {
+    let share = (packing.coverage() / phi).sqrt();
+    let sides = packing.domain().lengths() * share;
+    let domain = Domain::new(sides.x, sides.y).unwrap();
+    let positions = packing.positions().iter().map(|x| x * share).collect();
+    Packing::new(domain, packing.radii().to_vec(), positions).unwrap()
+}
+
+#[test]
+fn compression_to_dry_foam_converges_throughout() {
+    for model in KINDS {
+        for seed in [1, 2] {
+            let scene = finishing(model, scene(64, 0.95, seed));
+            let mut run = Relaxation::new(&scene).unwrap();
+            to_its_end(&mut run);
+            let mut pressure = run.observables().pressure();
+            for k in 1..=8 {
+                let phi = 0.95 + 0.005 * f64::from(k);
+                run = Relaxation::of_packing(&scene, compressed(run.packing(), phi)).unwrap();
+                to_its_end(&mut run);
+                let at = format!("{model:?} at φ = {phi}, seed {seed}");
+                assert_eq!(run.status(), Status::Converged, "{at}");
+                assert_eq!(run.stability(), Some(Stability::Minimum), "{at}");
+                let now = run.observables().pressure();
+                println!("{at}: {} steps, Π = {now:.6}", run.step());
+                assert!(now > pressure, "{at}: {pressure} → {now}");
+                pressure = now;
+            }
         }
     }
 }

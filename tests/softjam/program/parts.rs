@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// What can be changed where a run is taken up.
-const CHANGES: [&[&str]; 13] = [
+const CHANGES: [&[&str]; 16] = [
     &[],
     &["--threshold", "1e-12"],
     &["--threshold", "1e-4"],
@@ -20,6 +20,9 @@ const CHANGES: [&[&str]; 13] = [
     &["--every", "7"],
     &["--channels", "state=every:3,contours", "--redraw", "0"],
     &["--vertices", "12"],
+    &["--model", "wet-foam"],
+    &["--model", "rounded-polygon", "--minimizer", "fire+newton"],
+    &["--model", "disks", "--minimizer", "fire"],
 ];
 
 #[track_caller]
