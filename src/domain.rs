@@ -183,6 +183,32 @@ impl Domain {
         Vec2::new(wrap(x, self.lengths.x), position.y)
     }
 
+    /// Where a point of the sheared box would be in the upright one.
+    #[cfg(any(feature = "recording", feature = "figure"))]
+    pub(crate) fn straightened(&self, point: Vec2) -> Vec2 {
+        if self.tilt == 0.0 {
+            return point;
+        }
+        Vec2::new(point.x - self.tilt * (point.y / self.lengths.y), point.y)
+    }
+
+    /// The image of a wrapped position that lies between the slanted sides of the box: where it is drawn.
+    #[cfg(any(feature = "recording", feature = "figure"))]
+    pub(crate) fn seat(&self, position: Vec2) -> Vec2 {
+        let upright = self.straightened(position).x;
+        let turns = libm::floor(upright / self.lengths.x);
+        if turns == 0.0 {
+            return position;
+        }
+        Vec2::new(position.x - turns * self.lengths.x, position.y)
+    }
+
+    /// The corners of the box, once around, the first again at the end.
+    #[cfg(any(feature = "recording", feature = "figure"))]
+    pub(crate) fn corners(&self) -> [Vec2; 5] {
+        [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)].map(|(columns, rows)| self.period(columns, rows))
+    }
+
     /// The distances between opposite sides of the sheared box.
     pub(crate) fn heights(&self) -> Vec2 {
         let (l_x, l_y) = (self.lengths.x, self.lengths.y);

@@ -3,14 +3,16 @@
 use super::{Backbone, sums::Sums};
 use crate::contacts::Contacts;
 use crate::domain::Domain;
+#[cfg(feature = "recording")]
+use crate::models::Kind;
 use crate::models::droplet::contact::ContactLaw;
-use crate::models::{AnyModel, Kind, Model};
+use crate::models::{AnyModel, Model};
 use crate::state::Packing;
 
 /// The recorded metrics by name; a recording has one scalar each under `/metrics/`.
 ///
 /// `log10_f_max` is there because the viewer has no logarithmic axis; below 1e-18 it stays at −18.
-pub const METRICS: [&str; 10] = [
+pub const METRICS: [&str; 14] = [
     "f_max",
     "log10_f_max",
     "energy",
@@ -21,6 +23,10 @@ pub const METRICS: [&str; 10] = [
     "dt",
     "stress_xy",
     "moment",
+    "phi",
+    "strain",
+    "stress_xx",
+    "stress_yy",
 ];
 
 /// The values of [`METRICS`]; none where a model has no such number.
@@ -67,6 +73,8 @@ pub struct Observables {
     pub dt: f64,
     /// The largest moment `f |T|` of a contact (γ·length), where moments are balanced beside forces.
     pub moment: Option<f64>,
+    /// Coverage `φ` of the undeformed disks, and the strain so far, where a protocol changes the box.
+    pub phi_and_strain: Option<[f64; 2]>,
 }
 
 impl Observables {
@@ -241,6 +249,10 @@ impl Observables {
             Some(self.dt),
             Some(self.stress[1]),
             self.moment,
+            self.phi_and_strain.map(|[phi, _]| phi),
+            self.phi_and_strain.map(|[_, strain]| strain),
+            self.phi_and_strain.map(|_| self.stress[0]),
+            self.phi_and_strain.map(|_| self.stress[2]),
         ]
     }
 

@@ -1,5 +1,6 @@
 //! The flags that describe a scene. Each has a field of the same name in the scene file, over which it wins.
 
+use super::protocol::ProtocolFlags;
 use anyhow::Context as _;
 use clap::Args;
 use softjam::scene::{Channels, DiskFields, Scene, SceneError, SceneFields, Schedule};
@@ -91,6 +92,9 @@ pub struct SceneFlags {
     /// How the equations A f = δ of droplets are solved: conjugate-gradient, sparse-cholesky or gauss-jordan [default: conjugate-gradient].
     #[arg(long, value_name = "SOLVER", value_parser = named::<softjam::models::droplet::contact::solver::Method>, help_heading = RELAXATION)]
     contact_solver: Option<softjam::models::droplet::contact::solver::Method>,
+
+    #[command(flatten)]
+    protocol: ProtocolFlags,
 
     #[command(flatten)]
     channels: ChannelFlags,
@@ -198,6 +202,7 @@ impl SceneFlags {
             contact_solver: self.contact_solver,
             contours,
             channels,
+            protocol: self.protocol.fields(),
             ..SceneFields::default()
         };
         Ok(file.overridden_by(flags).into_scene()?)
@@ -265,7 +270,7 @@ pub fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
 }
 
 /// A number; whether it is in range is for the scene to say.
-fn real(text: &str) -> Result<f64, String> {
+pub(super) fn real(text: &str) -> Result<f64, String> {
     text.parse()
         .map_err(|_| "a number is expected, such as 0.9 or 1e-10".to_owned())
 }

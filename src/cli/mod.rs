@@ -12,6 +12,7 @@ mod live;
 mod manual;
 mod memory;
 mod output;
+mod protocol;
 mod record;
 mod replay;
 mod scene;

@@ -23,6 +23,8 @@
 //! A frame carries everything that the next one depends on. Nothing else that the loop keeps (neighbour list, buffers)
 //! can reach a result; [`Relaxation::resume`] starts from any frame and walks the same bits.
 
+mod drive;
 mod relax;
 
+pub use drive::Jamming;
 pub use relax::{DiskReport, RelaxError, Relaxation, Status, relax_disks};

@@ -5,7 +5,6 @@ use super::pictures::{Network, Rgb};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contour::{Contours, Extent};
-use crate::state::Frame;
 use rerun::external::arrow::array::{Array, ArrayRef, FixedSizeListArray, ListArray};
 use rerun::external::arrow::buffer::{OffsetBuffer, ScalarBuffer};
 use rerun::external::arrow::datatypes::{DataType, Field};
@@ -20,7 +19,7 @@ pub(super) type Column = (ComponentDescriptor, ListArray);
 pub(super) type Drawing<'a> = (
     &'a mut Contours,
     &'a [f64],
-    &'a Frame,
+    &'a [Vec2],
     &'a Contacts<'a>,
     f64,
 );
@@ -69,13 +68,13 @@ impl StripRows {
     /// contour and its extent, and says the colour.
     pub fn contours(
         &mut self,
-        (contours, radii, frame, contacts, line_tension): Drawing<'_>,
+        (contours, radii, positions, contacts, line_tension): Drawing<'_>,
         mut each: impl FnMut(usize, &[[f32; 2]], Extent) -> Rgb,
     ) -> usize {
         let (before, mut p) = (self.points.len(), 0);
         let (strips, colors) = (&mut self.strips, &mut self.colors);
         contours.trace(
-            (radii, &frame.positions, contacts, line_tension),
+            (radii, positions, contacts, line_tension),
             &mut self.points,
             |points, first, extent| {
                 points.push(points[first]);

@@ -2,6 +2,7 @@
 
 use super::columns::array;
 use super::encode::Encoder;
+use super::pictures::Rgb;
 use super::{Header, legend, legs_to_text};
 use crate::models::Kind;
 use crate::models::droplet::validity::SQUEEZE_LIMIT;
@@ -18,6 +19,9 @@ use std::io::{self, Write};
 /// The radius of what fills a particle, in its undeformed radius: inside the contour but for the deepest dents, and dark enough not
 /// to be taken for a particle of its own.
 const FILLED: f64 = 0.92;
+
+/// The colour of the periodic box.
+pub(super) const EDGE: Rgb = [200, 200, 200];
 
 /// Half the width of an outline among `particles`, in points of the screen: lines no wider than leave the shapes to be seen.
 fn outline_width(particles: usize) -> f32 {
@@ -55,10 +59,16 @@ pub(super) fn write<W: Write>(
     // Rerun's 2D views have y down, a packing has it up.
     let up = Transform3D::from_mat3x3([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
     put("/world", &up)?;
-    let (x, y) = (l.x as f32, l.y as f32);
-    let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
-    let edge = LineStrips2D::new([corners])
-        .with_colors([Color::from_rgb(200, 200, 200)])
+    // A box that changes is drawn where it does.
+    let edge = if header.scene.protocol.is_empty() {
+        let (x, y) = (l.x as f32, l.y as f32);
+        let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
+        let [r, g, b] = EDGE;
+        LineStrips2D::new([corners]).with_colors([Color::from_rgb(r, g, b)])
+    } else {
+        LineStrips2D::update_fields()
+    };
+    let edge = edge
         .with_radii([Radius::new_ui_points(1.0)])
         .with_draw_order(40.0);
     put("/world/box", &edge)?;

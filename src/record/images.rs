@@ -8,15 +8,26 @@ use super::cells::{Cells, own};
 use super::columns::{Column, StripRows};
 use super::pictures::{Rgb, dimmed};
 use crate::domain::{Domain, Vec2};
+use std::borrow::Cow;
 use std::io;
+
+/// Where the particles are drawn: between the slanted sides of a sheared box.
+pub(super) fn seats(domain: Domain, positions: &[Vec2]) -> Cow<'_, [Vec2]> {
+    if domain.tilt() == 0.0 {
+        return Cow::Borrowed(positions);
+    }
+    Cow::Owned(positions.iter().map(|x| domain.seat(*x)).collect())
+}
 
 /// Whether nothing that is no farther than `reach` from `centre` crosses an edge of the box, rounding to single precision
 /// included.
 pub(super) fn is_within(domain: Domain, centre: Vec2, reach: f64) -> bool {
     let l = domain.lengths();
     let reach = reach + 1e-6 * (l.x + l.y);
-    let inside = |x: f64, l: f64| x >= reach && x + reach <= l;
-    inside(centre.x, l.x) && inside(centre.y, l.y)
+    // A slanted side is nearer than it is along x.
+    let slant = l.x / domain.heights().x;
+    let inside = |x: f64, l: f64, reach: f64| x >= reach && x + reach <= l;
+    inside(domain.straightened(centre).x, l.x, reach * slant) && inside(centre.y, l.y, reach)
 }
 
 /// The shifts by a period that bring at least one of `vertices` into the open box, but for none at all: none for most
@@ -25,7 +36,9 @@ pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each:
     let l = domain.lengths();
     // Comparisons rather than minima: the loop is run for every vertex of every frame.
     let (mut least, mut most) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for v in vertices {
+    let slope = domain.tilt() / l.y;
+    for &[x, y] in vertices {
+        let v = [x - (slope * f64::from(y)) as f32, y];
         for k in 0..2 {
             least[k] = if v[k] < least[k] { v[k] } else { least[k] };
             most[k] = if v[k] > most[k] { v[k] } else { most[k] };
@@ -33,9 +46,9 @@ pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each:
     }
     let double = |&[x, y]: &[f32; 2]| Vec2::new(x.into(), y.into());
     let (least, most) = (double(&least), double(&most));
-    around(domain, least, most, |shift| {
+    around(domain, least, most, |shift, upright| {
         let inside = |v: &[f32; 2]| {
-            let v = double(v) + shift;
+            let v = domain.straightened(double(v)) + upright;
             let (x, y) = (v.x, v.y);
             x > 0.0 && x < l.x && y > 0.0 && y < l.y
         };
@@ -48,9 +61,10 @@ pub(super) fn shifts_of_polygon(domain: Domain, vertices: &[[f32; 2]], mut each:
 /// The shifts by a period that bring a part of `segment` into the open box, but for none at all.
 pub(super) fn shifts_of_segment(domain: Domain, &[a, b]: &[Vec2; 2], mut each: impl FnMut(Vec2)) {
     let l = domain.lengths();
-    around(domain, a.inf(&b), a.sup(&b), |shift| {
+    let [a, b] = [a, b].map(|end| domain.straightened(end));
+    around(domain, a.inf(&b), a.sup(&b), |shift, upright| {
         // Two convex shapes are apart if one of their sides separates them: for the sides of the box `around` has asked.
-        let middle = 0.5 * (a + b) + shift - 0.5 * l;
+        let middle = 0.5 * (a + b) + upright - 0.5 * l;
         let half = 0.5 * (b - a);
         let reach = 0.5 * (l.x * half.y.abs() + l.y * half.x.abs());
         if half.perp(&middle).abs() < reach {
@@ -59,16 +73,18 @@ pub(super) fn shifts_of_segment(domain: Domain, &[a, b]: &[Vec2; 2], mut each: i
     });
 }
 
-/// The shifts by a period that bring the rectangle between `least` and `most` into the open box, but for none at all.
-fn around(domain: Domain, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2)) {
+/// The shifts by a period that bring the rectangle between `least` and `most` into the open box, but for none at all: rectangle and second shift in
+/// the upright box that becomes this one when it is sheared.
+fn around(domain: Domain, least: Vec2, most: Vec2, mut each: impl FnMut(Vec2, Vec2)) {
     let l = domain.lengths();
     if least.x >= 0.0 && least.y >= 0.0 && most.x <= l.x && most.y <= l.y {
         return;
     }
     for shift in domain.around().skip(1) {
-        let (a, b) = (least + shift, most + shift);
+        let upright = domain.straightened(shift);
+        let (a, b) = (least + upright, most + upright);
         if a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0 {
-            each(shift);
+            each(shift, upright);
         }
     }
 }

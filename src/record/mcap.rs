@@ -15,6 +15,7 @@
 //!
 //! Messages are gathered into chunks of whole steps; a chunk is compressed and has a checksum, and so has the whole file.
 
+use super::images::seats;
 use super::messages::{
     ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage,
     descriptors, topic,
@@ -168,6 +169,11 @@ impl<W: Write> McapRecorder<W> {
 
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) -> io::Result<()> {
         let step = snapshot.step;
+        if let Some(domain) = frame.domain {
+            self.packing.set_domain(domain);
+            self.redraw.enter(domain);
+        }
+        let positions = seats(self.packing.domain(), &frame.positions);
         let particles = self.redraw.particles(snapshot, frame);
         let network = self.redraw.contacts(snapshot, frame);
         if particles.is_some() || network {
@@ -176,7 +182,7 @@ impl<W: Write> McapRecorder<W> {
             if let Some(particles) = particles {
                 let radii = self.packing.radii();
                 let contours = self.contours.at(&self.packing, frame);
-                contours.draw(radii, &frame.positions, &contacts, self.line_tension);
+                contours.draw(radii, &positions, &contacts, self.line_tension);
                 let colors = particles.colors();
                 let lines = contour_lines(step, contours, &colors);
                 let cloud = vertex_cloud(step, contours, &colors);
@@ -184,7 +190,7 @@ impl<W: Write> McapRecorder<W> {
                 self.send(self.topics.vertices, step, &cloud)?;
             }
             if network {
-                let network = Network::of(&frame.positions, self.packing.radii(), &contacts);
+                let network = Network::of(&positions, self.packing.radii(), &contacts);
                 let lines = contact_lines(step, &network);
                 self.send(self.topics.contacts, step, &lines)?;
             }

@@ -59,6 +59,14 @@ pub(crate) struct MetricsMessage {
     pub stress_xy: Option<f64>,
     #[prost(double, optional, tag = "12")]
     pub moment: Option<f64>,
+    #[prost(double, optional, tag = "13")]
+    pub phi: Option<f64>,
+    #[prost(double, optional, tag = "14")]
+    pub strain: Option<f64>,
+    #[prost(double, optional, tag = "15")]
+    pub stress_xx: Option<f64>,
+    #[prost(double, optional, tag = "16")]
+    pub stress_yy: Option<f64>,
 }
 
 impl MetricsMessage {
@@ -74,6 +82,10 @@ impl MetricsMessage {
             dt,
             stress_xy,
             moment,
+            phi,
+            strain,
+            stress_xx,
+            stress_yy,
         ] = metrics;
         Self {
             step,
@@ -88,6 +100,10 @@ impl MetricsMessage {
             dt,
             stress_xy,
             moment,
+            phi,
+            strain,
+            stress_xx,
+            stress_yy,
         }
     }
 
@@ -104,6 +120,10 @@ impl MetricsMessage {
             self.dt,
             self.stress_xy,
             self.moment,
+            self.phi,
+            self.strain,
+            self.stress_xx,
+            self.stress_yy,
         ]
     }
 }
@@ -133,6 +153,8 @@ pub(crate) struct StateMessage {
     pub r#box: Vec<f64>,
     #[prost(uint32, tag = "11")]
     pub stage: u32,
+    #[prost(double, repeated, tag = "12")]
+    pub protocol: Vec<f64>,
 }
 
 impl StateMessage {
@@ -154,6 +176,7 @@ impl StateMessage {
             memory: frame.memory.clone(),
             r#box: frame.domain.map_or(Vec::new(), |d| d.values().to_vec()),
             stage: frame.stage,
+            protocol: frame.protocol.clone(),
         }
     }
 }

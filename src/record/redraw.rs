@@ -59,6 +59,13 @@ impl Redraw {
         }
     }
 
+    /// Pictures of another box are drawn anew.
+    pub fn enter(&mut self, domain: Domain) {
+        if domain != self.domain {
+            (self.domain, self.particles, self.contacts) = (domain, None, None);
+        }
+    }
+
     /// What is seen of the particles of `frame`, if they have to be drawn for `snapshot`.
     pub fn particles(&mut self, snapshot: &Snapshot, frame: &Frame) -> Option<Particles> {
         if !snapshot.contours {

@@ -2,7 +2,7 @@
 
 use super::columns::StripRows;
 use super::hover::{ContactRows, ParticleRows};
-use super::images::{ImageRows, is_within, shifts_of_polygon, shifts_of_segment};
+use super::images::{ImageRows, is_within, seats, shifts_of_polygon, shifts_of_segment};
 use super::patience::Patience;
 use super::pictures::{Network, Particles, StageContours};
 use super::redraw::Redraw;
@@ -10,6 +10,7 @@ use super::states::StateRows;
 use super::{Header, Snapshot};
 use crate::analysis::Metrics;
 use crate::contacts::{Contacts, FrameContacts};
+use crate::domain::Domain;
 use crate::state::Frame;
 use crate::state::Packing;
 
@@ -30,6 +31,8 @@ pub(super) struct Rows {
     format: u32,
     contours: StageContours,
     redraw: Redraw,
+    /// The box drawn last, in a recording whose box changes.
+    drawn_box: Option<Option<Domain>>,
     patience: Patience,
     /// Whether there was a batch.
     begun: bool,
@@ -42,6 +45,8 @@ pub(super) struct Rows {
 #[derive(Default)]
 pub(super) struct Batch {
     pub metrics: Vec<MetricRow>,
+    /// Step, simulated time in nanoseconds and box, where it changes.
+    pub boxes: Vec<(u64, i64, Domain)>,
     pub contours: StripRows,
     pub contour_images: ImageRows,
     pub particles: ParticleRows,
@@ -70,6 +75,7 @@ impl Rows {
             format: header.format,
             contours: StageContours::of(&header.scene),
             redraw: Redraw::new(&header),
+            drawn_box: (!header.scene.protocol.is_empty()).then_some(None),
             patience: Patience::of(&header, BATCH_MOVES),
             begun: false,
             packing: header.packing,
@@ -126,6 +132,16 @@ impl Rows {
     }
 
     fn record_frame(&mut self, snapshot: &Snapshot, frame: &Frame) {
+        if let Some(domain) = frame.domain {
+            self.packing.set_domain(domain);
+            self.redraw.enter(domain);
+        }
+        let domain = self.packing.domain();
+        if self.drawn_box.is_some_and(|drawn| drawn != Some(domain)) {
+            let row = (snapshot.step, snapshot.nanoseconds, domain);
+            self.pending.boxes.push(row);
+            self.drawn_box = Some(Some(domain));
+        }
         let particles = self.redraw.particles(snapshot, frame);
         let network = self.redraw.contacts(snapshot, frame);
         if particles.is_some() || network {
@@ -157,6 +173,7 @@ impl Rows {
     ) {
         let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
         let (domain, radii) = (self.packing.domain(), self.packing.radii());
+        let positions = &*seats(domain, &frame.positions);
         let Batch {
             contours,
             contour_images: images,
@@ -167,12 +184,12 @@ impl Rows {
         let drawing = (
             self.contours.at(&self.packing, frame),
             radii,
-            frame,
+            positions,
             contacts,
             line_tension,
         );
         let vertices = contours.contours(drawing, |p, polygon, extent| {
-            let (color, centre) = (seen.color(p), frame.positions[p]);
+            let (color, centre) = (seen.color(p), positions[p]);
             if !is_within(domain, centre, extent.reach) {
                 shifts_of_polygon(domain, polygon, |shift| {
                     images.image(polygon, shift, color, p);
@@ -194,8 +211,9 @@ impl Rows {
 
     fn draw_contacts(&mut self, snapshot: &Snapshot, frame: &Frame, contacts: &Contacts<'_>) {
         let (step, nanoseconds) = (snapshot.step, snapshot.nanoseconds);
-        let network = Network::of(&frame.positions, self.packing.radii(), contacts);
         let domain = self.packing.domain();
+        let positions = seats(domain, &frame.positions);
+        let network = Network::of(&positions, self.packing.radii(), contacts);
         let Batch {
             contacts: rows,
             contact_images: images,

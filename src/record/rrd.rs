@@ -24,11 +24,13 @@
 
 use super::columns::{Column, StripRows, array, lists};
 use super::encode::Encoder;
+use super::header::EDGE;
 use super::hover::{ContactRows, ParticleRows};
 use super::images::ImageRows;
 use super::rows::{Batch, MetricRow, Rows};
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, id_of, legs_to_text};
 use crate::analysis::METRICS;
+use crate::domain::Domain;
 use rerun::external::arrow::array::{
     BooleanArray, Float64Array, StringArray, UInt8Array, UInt64Array,
 };
@@ -141,6 +143,7 @@ impl<W: Write> Chunks<W> {
         self.write_particles(batch.contours, batch.contour_images, batch.particles)?;
         self.write_contacts(batch.contacts, batch.contact_images, batch.contact_numbers)?;
         self.write_metrics(&batch.metrics)?;
+        self.write_boxes(&batch.boxes)?;
         let times = batch.states.times.clone();
         self.write_columns("/state", &times, batch.states.into_columns()?)?;
         self.intact = batch.last.or(self.intact);
@@ -224,6 +227,18 @@ impl<W: Write> Chunks<W> {
             self.write_columns(&format!("/metrics/{name}"), &times, columns)?;
         }
         Ok(())
+    }
+
+    /// Writes the boxes of a recording whose box changes.
+    fn write_boxes(&mut self, boxes: &[(u64, i64, Domain)]) -> io::Result<()> {
+        let times: Vec<(u64, i64)> = boxes.iter().map(|row| (row.0, row.1)).collect();
+        let mut rows = StripRows::default();
+        for (step, nanoseconds, domain) in boxes {
+            let corners = domain.corners().map(|v| [v.x as f32, v.y as f32]);
+            rows.strip(corners, EDGE);
+            rows.end_row(*step, *nanoseconds);
+        }
+        self.write_columns("/world/box", &times, rows.into_columns()?)
     }
 
     /// Writes rows that have been gathered by component; `times` are steps and simulated times in nanoseconds.

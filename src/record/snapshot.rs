@@ -64,7 +64,7 @@ impl Snapshot {
         room: impl FnOnce() -> Frame,
     ) -> Option<Self> {
         let channels = run.scheduled(channels);
-        let edge = edge || run.begins_stage();
+        let edge = edge || run.begins_stage() || run.is_relaxed_state();
         let [contours, contacts, metrics, state] = channels.at(run.step(), edge);
         let pictured = contours || contacts || state;
         (pictured || metrics).then(|| Self {

@@ -21,6 +21,7 @@ pub(super) struct StateRows {
     memories: Cells<f64, 1>,
     boxes: Cells<f64, 1>,
     stages: Cells<u32, 1>,
+    protocols: Cells<f64, 1>,
 }
 
 impl StateRows {
@@ -56,6 +57,8 @@ impl StateRows {
         self.stages
             .extend((frame.stage > 0).then_some([frame.stage]));
         self.stages.end_row();
+        (self.protocols).extend(frame.protocol.iter().map(|x| [*x]));
+        self.protocols.end_row();
     }
 
     /// The components of all rows.
@@ -81,6 +84,9 @@ impl StateRows {
         }
         if !self.stages.is_empty() {
             columns.push(self.stages.into_column(own("softjam.State:stage"))?);
+        }
+        if !self.protocols.is_empty() {
+            columns.push(self.protocols.into_column(own("softjam.State:protocol"))?);
         }
         Ok(columns)
     }

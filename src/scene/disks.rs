@@ -1,6 +1,6 @@
 //! The undeformed disks that droplets start from.
 
-use super::{Channels, Minimizer, Preparation, Scene, Schedule, Start};
+use super::{Channels, Minimizer, Preparation, Scene, Schedule, Stage, Start};
 use crate::minimize::fire::Fire;
 use crate::models::Kind;
 use crate::models::droplet::Form;
@@ -66,10 +66,30 @@ impl Scene {
     #[must_use]
     pub fn stage(&self, stage: u32) -> Cow<'_, Self> {
         if stage == 0 && self.records_disks() {
-            Cow::Owned(self.of_disks())
-        } else {
-            Cow::Borrowed(self)
+            return Cow::Owned(self.of_disks());
         }
+        match self.stage_of_protocol(stage) {
+            Some(Stage {
+                threshold, steps, ..
+            }) => Cow::Owned(Self {
+                threshold: *threshold,
+                steps: *steps,
+                ..self.clone()
+            }),
+            None => Cow::Borrowed(self),
+        }
+    }
+
+    /// The stage of the protocol that a stage of the run is; `None` for the relaxation at its start.
+    #[must_use]
+    pub fn stage_of_protocol(&self, stage: u32) -> Option<&Stage> {
+        let first = 1 + u32::from(self.records_disks());
+        self.protocol.get(stage.checked_sub(first)? as usize)
+    }
+
+    /// The last stage of a run.
+    pub(crate) fn last_stage(&self) -> u32 {
+        u32::from(self.records_disks()) + self.protocol.len() as u32
     }
 
     /// What `channels` ask for in a stage of a run of this scene.
@@ -84,12 +104,23 @@ impl Scene {
 
     /// Whether a run of this scene can have a frame with such a stage, memory and box.
     pub(crate) fn admits(&self, frame: &Frame) -> Result<(), FrameError> {
-        let last = u32::from(self.records_disks());
+        let is_of_protocol = self.stage_of_protocol(frame.stage).is_some();
         let model = self.stage(frame.stage).model;
         let foreign = [
-            ("a later stage", frame.stage > last),
+            ("a later stage", frame.stage > self.last_stage()),
             ("a memory", !frame.memory.is_empty() && !model.has_memory()),
-            ("a box of its own", frame.domain.is_some()),
+            (
+                "a box of its own",
+                frame.domain.is_some() && !is_of_protocol,
+            ),
+            (
+                "no box of its own",
+                frame.domain.is_none() && is_of_protocol,
+            ),
+            (
+                "numbers of a protocol",
+                frame.protocol.is_empty() == is_of_protocol,
+            ),
         ];
         let found = foreign.into_iter().find(|(_, is)| *is);
         found.map_or(Ok(()), |(what, _)| Err(FrameError::Foreign { what }))
@@ -109,6 +140,7 @@ impl Scene {
             dt_max: None,
             channels: self.channels.of_disks(self.disks.record),
             disks: DiskParameters::default(),
+            protocol: Vec::new(),
             start: Start::default(),
             ..self.clone()
         }

@@ -2,7 +2,7 @@
 
 use super::{
     Channels, DiskParameters, Minimizer, Preparation, Radii, Scene, SceneError, Schedule, Species,
-    Start,
+    StageFields, Start,
 };
 use crate::minimize::fire::Fire;
 use crate::models::Kind;
@@ -57,6 +57,7 @@ pub struct SceneFields {
     pub disks: Option<DiskFields>,
     pub contours: Option<ContourStyle>,
     pub channels: Option<Channels>,
+    pub protocol: Option<Vec<StageFields>>,
 }
 
 /// A continuous spread of radii as a scene file has it.
@@ -232,7 +233,8 @@ impl SceneFields {
             contact_tolerance,
             fire,
             contours,
-            channels
+            channels,
+            protocol
         )
     }
 
@@ -245,6 +247,12 @@ impl SceneFields {
         let start = self.start()?;
         let radii = self.radii()?;
         let default = Scene::default();
+        let threshold = self.threshold.unwrap_or(default.threshold);
+        let protocol = self.protocol.unwrap_or_default();
+        let stages = (1..)
+            .zip(&protocol)
+            .map(|(k, stage)| stage.stage(k, threshold));
+        let protocol = stages.collect::<Result<Vec<_>, _>>()?;
         let scene = Scene {
             particles: count("particles", self.particles, default.particles as u64, 1)? as usize,
             phi: self.phi.unwrap_or(default.phi),
@@ -253,7 +261,7 @@ impl SceneFields {
             start,
             seed: self.seed.unwrap_or(default.seed),
             line_tension: self.line_tension.unwrap_or(default.line_tension),
-            threshold: self.threshold.unwrap_or(default.threshold),
+            threshold,
             steps: count("steps", self.steps, default.steps, 0)?,
             model: self.model.unwrap_or_default(),
             minimizer: self.minimizer.unwrap_or_default(),
@@ -265,7 +273,12 @@ impl SceneFields {
             fire: self.fire.unwrap_or_default(),
             disks: self.disks.unwrap_or_default().parameters(),
             contours: self.contours.unwrap_or(default.contours),
-            channels: self.channels.unwrap_or_default(),
+            channels: self.channels.unwrap_or(if protocol.is_empty() {
+                Channels::default()
+            } else {
+                Channels::of_protocols()
+            }),
+            protocol,
         };
         scene.validate()?;
         Ok(scene)

@@ -19,6 +19,7 @@ mod disks;
 mod fields;
 mod print;
 pub mod schedule;
+mod stages;
 pub mod start;
 mod start_file;
 mod start_table;
@@ -27,6 +28,7 @@ mod validate;
 pub use disks::DiskParameters;
 pub use fields::{DiskFields, SceneFields};
 pub use schedule::{Channels, Schedule};
+pub use stages::{Act, Increment, Shear, Stage, StageFields, Until, Way};
 
 use crate::minimize::fire::Fire;
 use crate::models::disks::Disks;
@@ -205,6 +207,8 @@ pub struct Scene {
     pub contours: ContourStyle,
     /// What is recorded, and at which steps.
     pub channels: Channels,
+    /// What is done to the box behind the relaxation. Default nothing.
+    pub protocol: Vec<Stage>,
 }
 
 impl Default for Scene {
@@ -230,6 +234,7 @@ impl Default for Scene {
             disks: DiskParameters::default(),
             contours: ContourStyle::default(),
             channels: Channels::default(),
+            protocol: Vec::new(),
         }
     }
 }

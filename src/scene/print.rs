@@ -1,6 +1,6 @@
 //! The scene as a commented TOML text.
 
-use super::{Preparation, Radii, Scene, Start};
+use super::{Act, Increment, Preparation, Radii, Scene, Start, Until};
 use crate::models::Kind;
 use crate::text::is_hidden;
 use core::fmt::Write as _;
@@ -15,6 +15,7 @@ impl Scene {
         self.write_packing(&mut page);
         self.write_relaxation(&mut page);
         self.write_recording(&mut page);
+        self.write_protocol(&mut page);
         page.text
     }
 
@@ -233,6 +234,47 @@ impl Scene {
         }
         page.text("# Contours and contacts are drawn anew when a particle has moved by more than this (mean radii), or a pressure or\n# force has changed by more than ten times this (means), since they were last drawn; 0 draws every time.");
         page.line("redraw", number(self.channels.redraw));
+    }
+
+    /// The stages, each a table of its own at the end of the page.
+    fn write_protocol(&self, page: &mut Page) {
+        if !self.protocol.is_empty() {
+            page.text("\n# What is done to the box behind the relaxation, stage by stage: \"relax\", \"compress\" or \"decompress\" (to a coverage phi or a\n# pressure), \"jam\" (finds φ_J), \"shear\". Each state is relaxed to the stage's f_max; one that is not after so many steps ends the run.");
+        }
+        for stage in &self.protocol {
+            page.text("\n[[protocol]]");
+            page.line("act", quoted(stage.act.name()));
+            match stage.act {
+                Act::Relax => {}
+                Act::Compress { until, by } => {
+                    match until {
+                        Until::Phi(phi) => page.line("phi", number(phi)),
+                        Until::Pressure(pressure) => page.line("pressure", number(pressure)),
+                    }
+                    match by {
+                        Increment::Absolute(step) => page.line("step", number(step)),
+                        Increment::Relative(step) => page.line("relative_step", number(step)),
+                    }
+                }
+                Act::Jam { way, end } => {
+                    page.line("way", value(&way));
+                    page.line("end", number(end));
+                }
+                Act::Shear {
+                    mode,
+                    strain,
+                    step,
+                    cycles,
+                } => {
+                    page.line("mode", value(&mode));
+                    page.line("strain", number(strain));
+                    page.line("step", number(step));
+                    page.line("cycles", cycles);
+                }
+            }
+            page.line("threshold", number(stage.threshold));
+            page.line("steps", stage.steps);
+        }
     }
 }
 

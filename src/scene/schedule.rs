@@ -26,6 +26,8 @@ pub enum Schedule {
     Every(u64),
     /// About this many steps a decade, 1…1000, equally spaced in the logarithm.
     Log(u32),
+    /// The states of a protocol, relaxed: the last frame of each step of its strain.
+    Relaxed,
 }
 
 impl Schedule {
@@ -33,7 +35,7 @@ impl Schedule {
     #[must_use]
     pub fn includes(self, step: u64) -> bool {
         match self {
-            Self::Off => false,
+            Self::Off | Self::Relaxed => false,
             Self::Every(k) => step.is_multiple_of(k.max(1)),
             Self::Log(per_decade) => {
                 // A step is the first one behind a mark 10^(m/n). The small shift keeps whole powers of ten on
@@ -49,7 +51,7 @@ impl Schedule {
     #[must_use]
     pub fn after(self, step: u64) -> Option<u64> {
         match self {
-            Self::Off => None,
+            Self::Off | Self::Relaxed => None,
             Self::Every(k) => (step / k.max(1)).checked_add(1)?.checked_mul(k.max(1)),
             Self::Log(_) if step == 0 => Some(1),
             Self::Log(per_decade) => {
@@ -74,6 +76,7 @@ impl fmt::Display for Schedule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Off => write!(f, "off"),
+            Self::Relaxed => write!(f, "relaxed"),
             Self::Every(k) => write!(f, "every {k}"),
             Self::Log(n) => write!(f, "log {n}"),
         }
@@ -83,16 +86,17 @@ impl fmt::Display for Schedule {
 impl FromStr for Schedule {
     type Err = String;
 
-    /// Reads `off`, `every K` or `log K`; a colon may stand for the space.
+    /// Reads `off`, `relaxed`, `every K` or `log K`; a colon may stand for the space.
     fn from_str(text: &str) -> Result<Self, String> {
         let allowed = || {
             format!(
-                "`{text}` is not a schedule: write off, every K (K ≥ 1) or log K (K a decade, 1…1000)"
+                "`{text}` is not a schedule: write off, every K (K ≥ 1), log K (K a decade, 1…1000) or relaxed (the states of a protocol)"
             )
         };
         let mut words = text.split([' ', ':']).filter(|w| !w.is_empty());
         let schedule = match (words.next(), words.next(), words.next()) {
             (Some("off"), None, None) => Some(Self::Off),
+            (Some("relaxed"), None, None) => Some(Self::Relaxed),
             (Some("every"), Some(k), None) => k.parse().ok().filter(|&k| k >= 1).map(Self::Every),
             (Some("log"), Some(n), None) => n
                 .parse()
@@ -158,6 +162,18 @@ impl Default for Channels {
 }
 
 impl Channels {
+    /// What a protocol records where nothing is said: its relaxed states alone, which may be thousands of steps apart.
+    #[must_use]
+    pub fn of_protocols() -> Self {
+        Self {
+            contours: Schedule::Relaxed,
+            contacts: Schedule::Relaxed,
+            metrics: Schedule::Relaxed,
+            state: Schedule::Relaxed,
+            redraw: 0.0,
+        }
+    }
+
     /// Each channel with its name.
     #[must_use]
     pub fn named(&self) -> [(&'static str, Schedule); 4] {

@@ -1,5 +1,6 @@
 //! The allowed ranges.
 
+use super::stages::MOST as MOST_STAGES;
 use super::{Minimizer, Preparation, Radii, Scene, SceneError, Start};
 use crate::models::Kind;
 use crate::models::droplet::Form;
@@ -36,6 +37,15 @@ impl Scene {
             "1e-14 ≤ contact_tolerance ≤ 1e-6 (residual relative to the largest overlap)",
         )?;
         self.validate_model()?;
+        within(
+            "protocol",
+            self.protocol.len() as f64,
+            self.protocol.len() <= MOST_STAGES,
+            "1000 stages",
+        )?;
+        for (k, stage) in (1..).zip(&self.protocol) {
+            stage.validate(k)?;
+        }
         self.validate_minimizer()?;
         within(
             "contours.vertices",

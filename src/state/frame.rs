@@ -42,6 +42,8 @@ pub struct Frame {
     pub domain: Option<Domain>,
     /// The stage of the run, counted from 0; a run of one stage has 0 throughout.
     pub stage: u32,
+    /// How far the stage of a protocol has come; none in others.
+    pub protocol: Vec<f64>,
 }
 
 /// The numbers of a minimiser, under its name.
@@ -163,7 +165,7 @@ impl Frame {
     ///
     /// What a frame has beyond that follows under a name of its own, and only where there is something: `solver` and the
     /// minimiser's name unless it is `fire` or `fire+newton`, which the number of values tells apart; `memory`, its length u64
-    /// and the values (f64); `box` and `L_x`, `L_y`, tilt (f64); `stage` (u32).
+    /// and the values (f64); `box` and `L_x`, `L_y`, tilt (f64); `stage` (u32); `protocol`, its length u64 and the values (f64).
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {
         let minimizer = self.minimizer.values();
@@ -203,13 +205,20 @@ impl Frame {
             buffer.extend_from_slice(b"stage");
             buffer.extend_from_slice(&self.stage.to_le_bytes());
         }
+        if !self.protocol.is_empty() {
+            buffer.extend_from_slice(b"protocol");
+            buffer.extend_from_slice(&count(self.protocol.len()));
+            append(&mut buffer, self.protocol.iter().map(|x| [x.to_le_bytes()]));
+        }
         *blake3::hash(&buffer).as_bytes()
     }
 
     /// The bytes of its columns.
     #[cfg(feature = "recording")]
     pub(crate) fn bytes(&self) -> usize {
-        32 * self.positions.len() + 16 * self.contacts.len() + 8 * self.memory.len()
+        32 * self.positions.len()
+            + 16 * self.contacts.len()
+            + 8 * (self.memory.len() + self.protocol.len())
     }
 
     /// Checks that the frame can belong to `particles` particles in `domain`: lengths, order of contacts, positions in
@@ -267,6 +276,7 @@ impl Frame {
             &mut self.minimizer.values().iter().copied(),
         )?;
         finite("value of the memory", &mut self.memory.iter().copied())?;
+        finite("number of the protocol", &mut self.protocol.iter().copied())?;
         let domain = self.domain.unwrap_or(domain);
         let outside = |(_, p): &(usize, &Vec2)| !domain.contains(**p);
         if let Some((index, p)) = self.positions.iter().enumerate().find(outside) {

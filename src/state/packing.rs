@@ -167,6 +167,11 @@ impl Packing {
         &self.positions
     }
 
+    /// Puts the particles into another box, whose corner stays where it is; positions are the caller's to wrap.
+    pub(crate) fn set_domain(&mut self, domain: Domain) {
+        self.domain = domain;
+    }
+
     /// The centres, to be moved; whoever moves them keeps them wrapped and finite.
     pub(crate) fn positions_mut(&mut self) -> &mut Vec<Vec2> {
         &mut self.positions

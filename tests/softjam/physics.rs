@@ -14,6 +14,7 @@ mod gradient;
 mod matrix;
 mod model;
 mod newton;
+mod protocol;
 mod relaxation;
 mod stability;
 mod stress;

@@ -52,6 +52,23 @@ pub(super) fn of(
     lines.line("Z", z);
     lines.line("pressure", format!("{:.6e} γ/length", found.pressure()));
     lines.line("energy", format!("{:.6e} γ·length", found.energy));
+    if let Some([_, strain]) = found.phi_and_strain {
+        let [xx, xy, yy] = found.stress;
+        let stress = format!("σ_xy = {xy:.6e}, σ_xx = {xx:.6e}, σ_yy = {yy:.6e} γ/length");
+        lines.line("stress", format!("{stress} at strain {strain}"));
+    }
+    if let Some(jamming) = run.jamming() {
+        let way = match jamming.slope {
+            Some(slope) => format!("extrapolated from φ = {coverage:.8} with dp/dφ = {slope:.4}"),
+            None => "by bisection".to_owned(),
+        };
+        let (start, back) = (scene.phi, counted(jamming.failed as usize, "step"));
+        let jammed = format!(
+            "{:.10} ({way}; from a start at φ = {start}, {back} taken back)",
+            jamming.phi_j
+        );
+        lines.line("φ_J", jammed);
+    }
     if let Some(law) = run.law() {
         let residual = law.residual();
         let residual = format!("residual {residual:.1e} of the largest overlap");

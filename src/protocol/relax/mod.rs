@@ -3,11 +3,13 @@
 mod disks;
 mod present;
 mod status;
+mod strain;
 mod take_over;
 
 pub use disks::{DiskReport, relax_disks};
 pub use status::{RelaxError, Status};
 
+use super::drive::{Next, Progress};
 use crate::analysis::{Judgement, Stability, judge};
 use crate::domain::Vec2;
 use crate::minimize::{Motion, Mover};
@@ -45,10 +47,12 @@ pub struct Relaxation {
     step: u64,
     threshold: f64,
     step_limit: u64,
+    /// Of all stages.
+    scene: Box<Scene>,
     /// Counted from 0.
     stage: u32,
-    /// The scene of the stage behind this one, which is of disks then.
-    next: Option<Box<Scene>>,
+    /// How far a stage of the protocol has come.
+    progress: Progress,
     /// Whether this frame is the first of a stage behind another.
     begins_stage: bool,
     disks: Option<DiskReport>,
@@ -100,9 +104,9 @@ impl Relaxation {
     /// ```
     pub fn of_packing(scene: &Scene, packing: Packing) -> Result<Self, RelaxError> {
         scene.validate()?;
-        let next = scene.records_disks().then(|| Box::new(scene.clone()));
         let run = Self::begin(&scene.stage(0), packing, (0, 0.0))?;
-        Ok(Self { next, ..run })
+        let scene = Box::new(scene.clone());
+        Ok(Self { scene, ..run })
     }
 
     /// The first frame of a run of `scene` as it stands, which is valid, after so many steps and at such a time.
@@ -139,8 +143,9 @@ impl Relaxation {
             step,
             threshold: scene.threshold,
             step_limit: scene.steps,
+            scene: Box::new(scene.clone()),
             stage: 0,
-            next: None,
+            progress: Progress::default(),
             begins_stage: false,
             disks: None,
             judgement: OnceLock::new(),
@@ -164,10 +169,12 @@ impl Relaxation {
         scene.validate()?;
         frame.validate(packing.len(), packing.domain())?;
         scene.admits(&frame)?;
+        if let Some(domain) = frame.domain {
+            packing.set_domain(domain);
+        }
         *packing.positions_mut() = core::mem::take(&mut frame.positions);
-        let is_first_of_two = scene.records_disks() && frame.stage == 0;
-        let next = is_first_of_two.then(|| Box::new(scene.clone()));
-        let scene = &*scene.stage(frame.stage);
+        let whole = scene;
+        let scene = &*whole.stage(frame.stage);
         let mut model = scene.model();
         model.restore(&packing, &frame)?;
         let mover = Mover::resume(scene.fire, finishes(scene), &frame.minimizer).ok_or(
@@ -176,11 +183,20 @@ impl Relaxation {
                 count: frame.minimizer.values().len(),
             },
         )?;
+        let progress = match whole.stage_of_protocol(frame.stage) {
+            Some(stage) => Progress::from_values(&frame.protocol, stage.act, packing.len()),
+            None => Some(Progress::default()),
+        };
+        let progress = progress.ok_or(FrameError::Foreign {
+            what: "numbers of a protocol that are not its stage's",
+        })?;
         let moving = (frame.step, frame.velocities, mover);
         let run = Self::at(scene, packing, model, moving);
         Ok(Self {
-            next,
+            scene: Box::new(whole.clone()),
             stage: frame.stage,
+            step_limit: progress.began.saturating_add(run.step_limit),
+            progress,
             ..run
         })
     }
@@ -192,11 +208,20 @@ impl Relaxation {
     /// [`RelaxError::Contact`] if the contact problem cannot be solved, [`RelaxError::TooFar`] if the run blew up. The
     /// run has then [failed](Status::Failed) and is of no further use.
     pub fn advance(&mut self) -> Result<(), RelaxError> {
-        if self.is_stage_over() {
+        if self.are_disks_over() {
             return self.enter_next_stage();
         }
-        self.step += 1;
         self.begins_stage = false;
+        if self.is_balanced() && !self.is_on_saddle() {
+            match self.next_of_protocol() {
+                Some((stage, Next::Strained(packing, progress))) => {
+                    return self.strain(stage, *packing, progress);
+                }
+                Some((stage, Next::Over)) => self.enter(stage),
+                None => {}
+            }
+        }
+        self.step += 1;
         let is_on_saddle = self.is_on_saddle();
         let (packing, velocities) = (&mut self.packing, &mut self.velocities);
         if is_on_saddle {
@@ -211,19 +236,21 @@ impl Relaxation {
         self.solve_or_fail(motion)
     }
 
-    /// Whether this is the last frame of a stage that is followed by another.
-    fn is_stage_over(&self) -> bool {
-        self.next.is_some() && (self.is_balanced() || self.step >= self.step_limit)
+    /// Whether this is a frame of recorded disks.
+    fn is_of_disks(&self) -> bool {
+        self.stage == 0 && self.scene.records_disks()
+    }
+
+    /// Whether this is the last frame of recorded disks.
+    fn are_disks_over(&self) -> bool {
+        self.is_of_disks() && (self.is_balanced() || self.step >= self.step_limit)
     }
 
     /// The disks are relaxed, and become what the scene says.
     fn enter_next_stage(&mut self) -> Result<(), RelaxError> {
-        let Some(scene) = self.next.take() else {
-            return Ok(());
-        };
         let disks = Some(self.disk_report());
         let at = (self.step + 1, self.mover.time());
-        let begun = Self::begin(&scene, self.packing.clone(), at);
+        let begun = Self::begin(&self.scene, self.packing.clone(), at);
         self.failed = begun.is_err();
         *self = Self {
             stage: self.stage + 1,
@@ -299,8 +326,12 @@ impl Relaxation {
 
     /// Whether `f_max` is not above the threshold, nor a moment (γ·length), and the contact law is fulfilled.
     fn is_balanced(&self) -> bool {
-        self.f_max() <= self.threshold
-            && self.model.moment() <= self.threshold
+        self.is_balanced_to(self.threshold)
+    }
+
+    fn is_balanced_to(&self, threshold: f64) -> bool {
+        self.f_max() <= threshold
+            && self.model.moment() <= threshold
             && self.model.residual() <= self.model.accepted_residual()
     }
 
@@ -319,14 +350,18 @@ impl Relaxation {
     pub fn status(&self) -> Status {
         if self.failed {
             Status::Failed
-        } else if let Some(next) = &self.next {
-            if self.step < next.steps {
+        } else if self.is_of_disks() {
+            if self.step < self.scene.steps {
                 Status::Running
             } else {
                 Status::StepLimit
             }
         } else if self.is_balanced() && !self.is_on_saddle() {
-            Status::Converged
+            if self.next_of_protocol().is_none() {
+                Status::Converged
+            } else {
+                Status::Running
+            }
         } else if self.step >= self.step_limit {
             Status::StepLimit
         } else {

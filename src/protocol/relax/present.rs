@@ -29,8 +29,13 @@ impl Relaxation {
         self.model.copy_contacts(&self.packing, pairs, forces);
         frame.minimizer = self.mover.numbers();
         self.model.copy_memory(&mut frame.memory);
-        // No protocol of today changes the box.
-        (frame.domain, frame.stage) = (None, self.stage);
+        frame.stage = self.stage;
+        frame.domain = None;
+        frame.protocol.clear();
+        if self.is_strained() {
+            frame.domain = Some(self.packing.domain());
+            frame.protocol.extend(self.progress.values());
+        }
     }
 
     /// The stage of the run, counted from 0: disks that are recorded come first.
@@ -48,10 +53,13 @@ impl Relaxation {
     /// What `channels` ask for in this stage.
     #[must_use]
     pub fn scheduled(&self, channels: &Channels) -> Channels {
-        match &self.next {
-            Some(scene) => scene.scheduled(channels, self.stage),
-            None => *channels,
-        }
+        self.scene.scheduled(channels, self.stage)
+    }
+
+    /// Whether this frame is one of those between which a protocol strains the box: a relaxed state.
+    #[must_use]
+    pub fn is_relaxed_state(&self) -> bool {
+        !self.scene.protocol.is_empty() && !self.is_of_disks() && self.is_balanced()
     }
 
     /// The packing as it stands.
@@ -98,7 +106,12 @@ impl Relaxation {
 
     /// [`observables`](Self::observables) with a counter of rattlers that remembers the frame before.
     pub fn observables_counted(&self, backbone: &mut Backbone) -> Observables {
-        Observables::of_model(&self.model, &self.packing, self.mover.dt(), backbone)
+        let o = Observables::of_model(&self.model, &self.packing, self.mover.dt(), backbone);
+        let strained = !self.scene.protocol.is_empty() && !self.is_of_disks();
+        Observables {
+            phi_and_strain: strained.then(|| [self.packing.coverage(), self.progress.strain]),
+            ..o
+        }
     }
 
     /// The model with its residual.

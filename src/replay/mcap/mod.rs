@@ -291,6 +291,7 @@ fn read_state(bytes: &[u8]) -> Result<Item, String> {
         memory: message.memory,
         domain,
         stage: message.stage,
+        protocol: message.protocol,
     };
     Ok(Item::State(frame, message.digest))
 }

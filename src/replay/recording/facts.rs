@@ -70,7 +70,8 @@ impl Recording {
     /// [`ReadError::Damaged`] if its radii and box make no packing.
     pub fn header(&self) -> Result<crate::record::Header, ReadError> {
         // Radii and box are all that a header has of a packing.
-        let packing = self.packing_anywhere(vec![Vec2::zeros(); self.header.radii.len()])?;
+        let corner = vec![Vec2::zeros(); self.header.radii.len()];
+        let packing = self.packing_anywhere(self.header.domain, corner)?;
         Ok(crate::record::Header {
             scene: self.header.scene.clone(),
             packing,

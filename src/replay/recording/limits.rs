@@ -1,7 +1,7 @@
 //! What is made of a recording only within limits: packings that could be ones, runs that fit in memory.
 
 use super::{ReadError, Recording};
-use crate::domain::Vec2;
+use crate::domain::{Domain, Vec2};
 use crate::models::droplet::contact::solver::Method;
 use crate::neighbors::crowding;
 use crate::neighbors::crowding::Crowd;
@@ -28,7 +28,8 @@ impl Recording {
 
     /// The packing at a frame, and the number of pairs of its disks that overlap.
     fn packing_and_overlaps(&self, frame: &Frame) -> Result<(Packing, usize), ReadError> {
-        let packing = self.packing_anywhere(frame.positions.clone())?;
+        let domain = frame.domain.unwrap_or(self.header.domain);
+        let packing = self.packing_anywhere(domain, frame.positions.clone())?;
         match crowding::pairs(&packing) {
             Ok(overlaps) => Ok((packing, overlaps)),
             Err(Crowd { particle, others }) => Err(ReadError::Crowded {
@@ -40,11 +41,14 @@ impl Recording {
         }
     }
 
-    /// The particles at any positions.
-    pub(super) fn packing_anywhere(&self, positions: Vec<Vec2>) -> Result<Packing, ReadError> {
+    /// The particles at any positions in a box.
+    pub(super) fn packing_anywhere(
+        &self,
+        domain: Domain,
+        positions: Vec<Vec2>,
+    ) -> Result<Packing, ReadError> {
         let radii = self.header.radii.clone();
-        Packing::new(self.header.domain, radii, positions)
-            .map_err(|error| self.damaged(error.to_string()))
+        Packing::new(domain, radii, positions).map_err(|error| self.damaged(error.to_string()))
     }
 
     /// Whether the scene can be run from `frame` on within the budget: to be asked before it is.

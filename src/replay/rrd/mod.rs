@@ -209,6 +209,7 @@ fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
     let mut memories = numbers("softjam.State:memory").into_iter();
     let mut boxes = numbers("softjam.State:box").into_iter();
     let mut stages = chunk.iter_slices::<u32>("softjam.State:stage".into());
+    let mut protocols = numbers("softjam.State:protocol").into_iter();
     for step in steps(chunk) {
         let missing = |what| format!("no {what} at step {step}");
         let name = solvers.next();
@@ -234,6 +235,7 @@ fn read_states(chunk: &Chunk, items: &mut Vec<Item>) -> Result<(), String> {
                 .next()
                 .and_then(|list| list.first().copied())
                 .unwrap_or(0),
+            protocol: protocols.next().unwrap_or_default(),
         };
         let digest = digests.next().ok_or_else(|| missing("digest"))?;
         items.push(Item::State(frame, digest));
