@@ -2,15 +2,20 @@
 """Checks a softjam recording with nothing of softjam's: only rerun's reader, numpy and the formulas of the paper.
 
 For every recorded state (or every K-th, with --every K):
-  eq. (4)        max |A f - delta| relative to max |delta|, A assembled densely from the positions; of disks |f/k - delta|
+  eq. (4)        max |A f - delta| relative to max |delta|, A assembled densely from the positions; of disks |f/k - delta|;
+                 of droplets that keep their area the gaps of contacts and the areas (foam_law.py)
   contact law    f > 0 on contacts, gap >= 0 for all other pairs
   balance        the largest net force, against the recorded f_max
   pressure, U, Z from forces and distances, against the recorded metrics
-  contours       every vertex against rho_i(theta) at its own angle
+  contours       every vertex against rho_i(theta) at its own angle; of droplets that keep their area against their arcs, and
+                 what these enclose and how long they are against pi R^2 and U, as far as f_max lets them close
   left out       how far the latest contours and contacts are from a state that has none of its own
   beside them    periodic images of contours and contacts, undeformed disks, the numbers of particles and contacts
 
-usage: check_recording.py RUN.rrd [--every K]      (pip install rerun-sdk==0.36.3 numpy)
+With --perturb force one contact force is changed by a millionth of itself, with --perturb memory all that droplets remember, with
+which no recording may pass.
+
+usage: check_recording.py RUN.rrd [--every K] [--perturb force|memory]      (pip install rerun-sdk==0.36.3 numpy)
 """
 
 import argparse
@@ -20,18 +25,7 @@ import tomllib
 import numpy as np
 import rerun.experimental as rerun
 
-
-def g(theta):
-    """The kernel of eq. (2), even and 2 pi periodic."""
-    t = np.mod(np.abs(theta), 2 * np.pi)
-    return (np.pi - t) * np.sin(t) - 0.5 * np.cos(t) - 1.0
-
-
-def dg(theta):
-    """The slope of g; it jumps at 0, where no two contacts of a particle lie."""
-    t = np.mod(theta, 2 * np.pi)
-    return (np.pi - t) * np.cos(t) - 0.5 * np.sin(t)
-
+from foam_law import Droplets, dg, g
 
 # What stands beside the contours and the contacts, by entity.
 BESIDE = {
@@ -45,7 +39,7 @@ BESIDE = {
 
 class Recording:
     def __init__(self, path):
-        self.states, self.contours, self.metrics, self.stages = {}, {}, {}, {}
+        self.states, self.contours, self.metrics, self.stages, self.memory = {}, {}, {}, {}, {}
         self.beside = {entity: {} for entity in BESIDE}
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch = chunk.to_record_batch()
@@ -55,9 +49,8 @@ class Recording:
                 self.line_tension = scene["line_tension"]
                 self.gradient = scene.get("forces", "central") == "gradient"
                 model = scene.get("model", "morse-witten")
-                if model not in ("morse-witten", "disks"):
-                    sys.exit(f"{path} is of the model {model}, whose law is not checked here")
-                self.model_is_disks = model == "disks"
+                self.model_is_disks, self.keeps_area = model == "disks", model in ("rounded-polygon", "wet-foam")
+                self.arcs = model == "wet-foam"
                 self.records_disks = scene.get("disks", {}).get("record", "off") != "off"
                 self.threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
                 self.seed_rule = scene.get("contact_rule") in ("saitoh", "seed")
@@ -74,6 +67,8 @@ class Recording:
                         flat(batch["softjam.State:" + name][row])
                         for name in ("position", "contact", "force")
                     )
+                    if "softjam.State:memory" in batch.schema.names and batch["softjam.State:memory"][row].is_valid:
+                        self.memory[batch["step"][row].as_py()] = flat(batch["softjam.State:memory"][row]).copy()
                     if "softjam.State:stage" in batch.schema.names and (stage := batch["softjam.State:stage"][row]).is_valid:
                         self.stages[batch["step"][row].as_py()] = sum(stage.as_py())
             elif entity == "/world/contours" and not chunk.is_static:
@@ -149,6 +144,7 @@ def check_state(recording, state, gamma, disks):
     net = np.zeros((n, 2))
     np.add.at(net, i, forces[:, None] * normal)
     np.add.at(net, j, -forces[:, None] * normal)
+    twist = 0.0
     if recording.gradient:
         # -dU/dr = f n + (tau / r) t, tau_c = -f_c sum R_p/(2 pi gamma) g'(angle of c less that of k) f_k.
         torque = np.zeros(len(forces))
@@ -160,6 +156,7 @@ def check_state(recording, state, gamma, disks):
         push = (torque / r)[:, None] * np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         np.add.at(net, i, push)
         np.add.at(net, j, -push)
+        twist = 0.5 * (torque * (normal[:, 0] ** 2 - normal[:, 1] ** 2)).sum() / box.prod()
     return {
         "eq4": residual,
         "gap": least_gap / scale,
@@ -167,10 +164,46 @@ def check_state(recording, state, gamma, disks):
         "f_max": np.hypot(net[:, 0], net[:, 1]).max(),
         "pressure": (forces * r).sum() / (2 * box.prod()),
         "energy": 0.5 * (forces * delta).sum(),
+        "stress_xy": -(forces * r * normal[:, 0] * normal[:, 1]).sum() / box.prod() - twist,
         "coordination": coordination(n, contacts),
         "around": around,
         "scale": scale,
     }
+
+
+def check_foam(recording, step, state, gamma):
+    """`check_state` of droplets that keep their area, and what their arcs enclose, over what f_max allows."""
+    positions, contacts, forces = state
+    radii = recording.radii
+    droplets = Droplets(positions, radii, recording.box, contacts, forces / gamma, recording.memory[step], recording.arcs)
+    pressed = droplets.force > 0
+    sums = radii[droplets.i] + radii[droplets.j]
+    scale = np.abs(sums - droplets.distance)[pressed].max(initial=0.0) or 1.0
+    law = max(np.abs(droplets.gap[pressed]).max(initial=0.0), np.abs(droplets.areas() / (2 * np.pi * radii)).max())
+    net, stress, force = droplets.net(), droplets.stress(), droplets.force
+    f_max = np.hypot(*net.T).max()
+    found = {
+        "droplets": droplets,
+        "eq4": law / scale,
+        "gap": min(droplets.gap[~pressed].min(initial=np.inf), droplets.far_gap()) / scale,
+        "force": forces.min(initial=np.inf),
+        "f_max": gamma * f_max,
+        "pressure": -0.5 * gamma * np.trace(stress),
+        "stress_xy": gamma * stress[0, 1],
+        "energy": gamma * droplets.energy(),
+        "coordination": coordination(len(radii), contacts),
+        "scale": scale,
+        "moment": np.abs(force * droplets.arm).max(initial=0.0),
+    }
+    # Arcs close but for the net force; what they enclose and how long they are is wrong by less.
+    allowed = promised(recording, f_max, scale, False) * scale + 1e-13
+    missed = max(droplets.pieces(p)[1] for p in range(len(radii)))
+    enclosed = [droplets.contour_area(p) for p in range(len(radii))] - np.pi * radii**2
+    length = sum(droplets.contour_length(p) - 2 * np.pi * radii[p] for p in range(len(radii)))
+    found["closed"] = missed / (radii.max() * f_max + allowed)
+    found["enclosed"] = np.abs(enclosed / (2 * np.pi * radii)).max() / (0.1 * radii.max() * f_max + allowed)
+    found["length"] = abs(length - droplets.energy()) / (0.01 * radii.sum() * f_max + (1 + force.sum()) * allowed)
+    return found
 
 
 def promised(recording, f_max, scale, disks):
@@ -183,20 +216,24 @@ def promised(recording, f_max, scale, disks):
     return max(16 * tolerance, 1e-9)
 
 
-def check_contours(recording, state, around, strips, gamma):
-    """The largest distance of a vertex from rho at its own angle."""
+def check_contours(recording, state, found, strips, gamma):
+    """The largest distance of a vertex from rho at its own angle; from the arcs, over how far they miss each other."""
     positions, _, forces = state
     radii = recording.radii
     worst = 0.0
     for p, strip in enumerate(strips.as_py()):
-        v = np.asarray(strip, dtype=float) - positions[p]
-        theta = np.arctan2(v[:, 1], v[:, 0])
-        rho = np.full(len(v), radii[p])
-        for a, c in around[p]:
-            rho += radii[p] / (2 * np.pi * gamma) * forces[c] * g(theta - a)
-        worst = max(worst, np.abs(np.hypot(v[:, 0], v[:, 1]) - rho).max())
         if not np.array_equal(strip[0], strip[-1]):
             sys.exit(f"contour {p} is not closed")
+        v = np.asarray(strip, dtype=float) - positions[p]
+        if "droplets" in found:
+            droplets = found["droplets"]
+            worst = max(worst, droplets.off_contour(p, v).max() - droplets.pieces(p)[1])
+            continue
+        theta = np.arctan2(v[:, 1], v[:, 0])
+        rho = np.full(len(v), radii[p])
+        for a, c in found["around"][p]:
+            rho += radii[p] / (2 * np.pi * gamma) * forces[c] * g(theta - a)
+        worst = max(worst, np.abs(np.hypot(v[:, 0], v[:, 1]) - rho).max())
     return worst
 
 
@@ -249,7 +286,16 @@ def coordination(n, contacts):
     return 2 * held[contacts].all(axis=1).sum() / held.sum() if held.any() else 0.0
 
 
-def check_beside(recording, step, state, around, gamma, single):
+def deepest(recording, found, forces, gamma, p):
+    """The deepest dent of particle p, in its radius: at its contacts, where the contour of the linear model is deepest."""
+    if "droplets" in found:
+        ends = [end for film in found["droplets"].contour(p) for end in (film[0], film[1], 0.5 * (film[0] + film[1]))]
+        return max([0.0] + [1 - np.hypot(*end) / recording.radii[p] for end in ends])
+    at = found["around"][p]
+    return max([0.0] + [-sum(forces[k] * g(a - b) for b, k in at) / (2 * np.pi * gamma) for a, _ in at])
+
+
+def check_beside(recording, step, state, found, gamma, single):
     """What stands beside contours and contacts; the number of images, and the largest relative error of a number."""
     positions, contacts, forces = state
     radii, box, n = recording.radii, recording.box, len(recording.radii)
@@ -281,8 +327,7 @@ def check_beside(recording, step, state, around, gamma, single):
             words = text.replace(",", "").split()
             if words[:5:2] != ["p", "Z", "dent"] or words[3] != str(z[p]) or ("rattler" in words) != rattler:
                 sys.exit(f"step {step}, particle {p}: {text!r}; Z is {z[p]}, rattler: {rattler}")
-            # At the contacts, where the contour of the linear model is deepest.
-            dent = max([0.0] + [-sum(forces[k] * g(a - b) for b, k in around[p]) / (2 * np.pi * gamma) for a, _ in around[p]])
+            dent = deepest(recording, found, forces, gamma, p)
             for printed, value, slack in ((words[1], pressure[p], 0), (words[5], dent, 0)):
                 # Three digits.
                 worst = max(worst, (abs(float(printed) - value) - 0.00501 * value - slack) / max(value, 1e-300))
@@ -327,25 +372,33 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("path")
     parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--perturb", choices=("force", "memory"))
     arguments = parser.parse_args()
     recording = Recording(arguments.path)
     gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
-    checks = ("eq4", "gap", "force", "f_max", "pressure", "energy", "coordination", "contour", "beside", "left out")
-    worst = dict.fromkeys(checks, 0.0)
+    checks = "eq4 gap force f_max pressure energy stress_xy coordination closed enclosed length contour beside left"
+    worst = dict.fromkeys(checks.split(), 0.0)
     vertices, count, latest = 0, 0, 0
     # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
     single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
     for step in steps:
         state = recording.states[step]
         disks = recording.disks(step)
-        found = check_state(recording, state, gamma, disks)
+        if arguments.perturb == "force":
+            state = *state[:2], state[2] * (1 + 1e-6 * (np.arange(len(state[2])) == 0))
+        elif arguments.perturb:
+            recording.memory[step] *= 1 + 1e-6
+        foam = recording.keeps_area and not disks
+        found = check_foam(recording, step, state, gamma) if foam else check_state(recording, state, gamma, disks)
         allowed = promised(recording, found["f_max"] / gamma, found["scale"], disks)
         worst["eq4"] = max(worst["eq4"], found["eq4"] / allowed)
         worst["gap"] = max(worst["gap"], -found["gap"] / allowed)
         worst["force"] = max(worst["force"], -found["force"])
-        for name in ("f_max", "pressure", "energy"):
+        for name in ("closed", "enclosed", "length"):
+            worst[name] = max(worst[name], found.get(name, 0.0))
+        for name in ("f_max", "pressure", "energy", "stress_xy"):
             recorded = recording.metrics[name][step]
             worst[name] = max(worst[name], abs(found[name] / gamma - recorded))
         recorded = recording.metrics["coordination"][step]
@@ -353,26 +406,38 @@ def main():
         if step in recording.contours:
             strips = recording.contours[step]
             vertices += sum(len(s) for s in strips)
-            contour = check_contours(recording, state, found["around"], strips, gamma)
+            contour = check_contours(recording, state, found, strips, gamma)
             worst["contour"] = max(worst["contour"], contour)
-        more, beside = check_beside(recording, step, state, found["around"], gamma, single)
+        more, beside = check_beside(recording, step, state, found, gamma, single)
         count, worst["beside"] = count + more, max(worst["beside"], beside)
         latest += step not in recording.contours
-        worst["left out"] = max(worst["left out"], check_left_out(recording, step, state, gamma))
+        worst["left"] = max(worst["left"], check_left_out(recording, step, state, gamma))
+    # Moments are balanced where a run has converged.
+    balanced = recording.keeps_area and recording.metrics["f_max"][steps[-1]] <= recording.threshold
+    worst["moment"] = found["moment"] / recording.threshold if balanced else 0.0
+    law = "gaps of contacts, and areas," if recording.keeps_area else "eq. (4), |A f - delta|"
     limits = {
-        "eq4": (1.0, "eq. (4), |A f - delta| over what the frame's f_max allows"),
+        "eq4": (1.0, law + " over what the frame's f_max allows"),
         "gap": (1.0, "overlap of pairs that are not contacts over what f_max allows"),
         "force": (0.0, "negative contact force"),
         "f_max": (1e-9, "net force against the recorded f_max"),
         "pressure": (1e-9, "pressure against the recorded one"),
         "energy": (1e-9, "energy against the recorded one"),
+        "stress_xy": (1e-9, "shear stress against the recorded one"),
         "coordination": (1e-12, "Z against the recorded one"),
-        "contour": (single, f"contour vertex off rho(theta), {vertices} vertices"),
+        "contour": (single, f"contour vertex off its contour, {vertices} vertices"),
         "beside": (2e-7, f"numbers of particles and contacts, beside {count} periodic images"),
-        "left out": (1 + 1e-9, f"the latest picture over what redraw allows, {latest} states without contours of their own"),
+        "left": (1 + 1e-9, f"the latest picture over what redraw allows, {latest} states without contours of their own"),
     }
     last = steps[-1]
     print(f"{arguments.path}: {len(steps)} states up to step {last}, recorded f_max = {recording.metrics['f_max'][last]:.3e}")
+    if recording.keeps_area:
+        limits |= {
+            "closed": (1.0, "how far arcs miss each other over what f_max allows"),
+            "enclosed": (1.0, "what arcs enclose against pi R^2 over what f_max allows"),
+            "length": (1.0, "their length against the energy over what f_max allows"),
+            "moment": (1.0, "moments of the last state over the threshold"),
+        }
     bad = 0
     for name, (limit, text) in limits.items():
         verdict = "ok" if worst[name] <= limit else "BAD"
