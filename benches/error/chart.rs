@@ -78,9 +78,10 @@ impl Axis {
     fn ticks(&self) -> Vec<(f64, String)> {
         let (a, b) = self.range;
         if !self.log {
+            let digits = if b - a < 0.5 { 2 } else { 1 };
             return (0..=5)
                 .map(|k| a + (b - a) * f64::from(k) / 5.0)
-                .map(|v| (v, format!("{v:.1}")))
+                .map(|v| (v, format!("{v:.digits$}")))
                 .collect();
         }
         let (first, last) = (a.log10().floor() as i32, b.log10().ceil() as i32);

@@ -1,8 +1,9 @@
-//! The figure: six panels from the six tables.
+//! The figure: eight panels from the six tables.
 
 use super::chart::{
     Axis, BLACK, BLUE, Bars, GREEN, Line, Marker, ORANGE, PINK, Panel, RED, SIZE, SKY, Series,
 };
+use super::laws;
 use super::table::Table;
 use std::fmt::Write as _;
 
@@ -11,19 +12,21 @@ pub fn draw(tables: &[Table]) -> String {
     let panels = [
         contact(&tables[0]),
         relaxation(&tables[1]),
-        model(&tables[2]),
+        laws::model(&tables[2]),
         size(&tables[3]),
         recording(&tables[4]),
         contour(&tables[5]),
+        laws::packings(&tables[2]),
+        laws::time(&tables[2]),
     ];
-    let (width, height) = (3.0 * SIZE.0, 2.0 * SIZE.1);
+    let (width, height) = (4.0 * SIZE.0, 2.0 * SIZE.1);
     let mut s = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
          font-family=\"Helvetica, Arial, 'DejaVu Sans', sans-serif\" font-size=\"15\">\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
     );
     for (k, panel) in panels.iter().enumerate() {
-        let (x, y) = ((k % 3) as f64 * SIZE.0, (k / 3) as f64 * SIZE.1);
+        let (x, y) = ((k % 4) as f64 * SIZE.0, (k / 4) as f64 * SIZE.1);
         // Writing to a String cannot fail.
         let _ = writeln!(s, "<g transform=\"translate({x} {y})\">\n{panel}</g>");
     }
@@ -31,7 +34,7 @@ pub fn draw(tables: &[Table]) -> String {
     s
 }
 
-fn series(
+pub fn series(
     label: &str,
     points: Vec<(f64, f64)>,
     color: &'static str,
@@ -179,60 +182,6 @@ fn relaxation(table: &Table) -> String {
         y: Axis::log("largest net force (γ)", (1e-14, 1.0)),
         legend: (0.03, 0.52),
         notes: Vec::new(),
-        series,
-    }
-    .svg()
-}
-
-fn model(table: &Table) -> String {
-    let of = |geometry: &str| table.points(&[("geometry", geometry)], "squeeze", "model_error");
-    let packings = of("packing");
-    let mut notes = Vec::new();
-    for phi in ["0.845", "0.86", "0.88", "0.9", "0.95"] {
-        let filter = [("geometry", "packing"), ("phi", phi)];
-        for (x, y) in table.points(&filter, "squeeze", "model_error") {
-            notes.push((x, y, format!("φ = {phi}")));
-        }
-    }
-    let series = vec![
-        series(
-            "hexagonal crystal, softjam",
-            of("hexagonal crystal"),
-            BLUE,
-            Marker::Open,
-            Line::None,
-        ),
-        series(
-            "packings, mean squeeze",
-            packings,
-            BLACK,
-            Marker::Square,
-            Line::None,
-        ),
-        series(
-            "two plates",
-            of("two plates"),
-            GREEN,
-            Marker::None,
-            Line::Dashed,
-        ),
-        series("square", of("square"), ORANGE, Marker::None, Line::Solid),
-        series("hexagon", of("hexagon"), RED, Marker::None, Line::Dashed),
-        series(
-            "",
-            vec![(1e-3, 0.1), (3.0, 0.1)],
-            PINK,
-            Marker::None,
-            Line::Dashed,
-        ),
-    ];
-    notes.push((1e-3, 0.1, "10 %".into()));
-    Panel {
-        title: "c  Error of the model itself".into(),
-        x: Axis::log("squeeze Σf / 2πγ", (1e-3, 3.0)),
-        y: Axis::log("force too small by", (1e-3, 3.0)),
-        legend: (0.04, 0.06),
-        notes,
         series,
     }
     .svg()

@@ -7,7 +7,7 @@
 //! cargo bench --no-default-features --bench error -- --out docs/benchmark
 //! ```
 //!
-//! Files go to `target/benchmark` unless `--out` names a folder. Items: `contact` (a), `relaxation` (b), `model` (c), `size`
+//! Files go to `target/benchmark` unless `--out` names a folder. Items: `contact` (a), `relaxation` (b), `model` (c, g, h), `size`
 //! (d), `recording` (e; needs the program, `cargo build --release`, or its path in `SOFTJAM`), `contour` (f), `figure`. What is
 //! compared is measured in turn in one run; times are medians.
 
@@ -29,7 +29,9 @@ mod chart;
 mod contact;
 mod contour;
 mod figure;
+mod laws;
 mod model;
+mod packings;
 mod recording;
 mod relaxation;
 mod size;

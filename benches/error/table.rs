@@ -33,6 +33,14 @@ impl Table {
         self.rows.push(row);
     }
 
+    /// Adds a row of fields under their columns and shows it; other fields stay empty.
+    pub fn add(&mut self, fields: &[(&str, &str)]) {
+        let known = |name: &str| self.columns.iter().any(|column| column == name);
+        assert!(fields.iter().all(|f| known(f.0)), "columns of {fields:?}");
+        let of = |column: &String| fields.iter().find(|f| f.0 == column).map_or("", |f| f.1);
+        self.push(self.columns.iter().map(|c| of(c).to_owned()).collect());
+    }
+
     pub fn write(&self, path: &Path) -> Result<(), Box<dyn Error>> {
         let mut text = self.columns.join(",");
         for row in &self.rows {

@@ -161,7 +161,7 @@ def check(path, largest):
     return [
         (1e-9, abs(energy - 2 * np.pi * foam.radii[held].sum() - droplets.energy()), f"energy, {droplets.energy():.9f}"),
         (1e-9, abs((2 * p @ areas - energy) / (2 * volume) - pressure), f"osmotic pressure, {pressure:.9f}"),
-        (1e-6 * pressure, abs(slope + pressure), "osmotic pressure as a slope of the energy"),
+        (1e-7 + 1e-6 * pressure, abs(slope + pressure), "osmotic pressure as a slope of the energy"),
         (1e-8, np.abs(p * droplets.corner[held] - 1).max(), "pressures of droplets, relative"),
         (1e-8, np.abs(mean * chords - droplets.force[films]).max(), "forces of contacts"),
     ]
