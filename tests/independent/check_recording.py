@@ -25,7 +25,7 @@ import tomllib
 import numpy as np
 import rerun.experimental as rerun
 
-from foam_law import Droplets, dg, g
+from foam_law import ARCS, Droplets, dg, g
 
 # What stands beside the contours and the contacts, by entity.
 BESIDE = {
@@ -165,45 +165,19 @@ def check_state(recording, state, gamma, disks):
         "pressure": (forces * r).sum() / (2 * box.prod()),
         "energy": 0.5 * (forces * delta).sum(),
         "stress_xy": -(forces * r * normal[:, 0] * normal[:, 1]).sum() / box.prod() - twist,
-        "coordination": coordination(n, contacts),
         "around": around,
         "scale": scale,
     }
 
 
 def check_foam(recording, step, state, gamma):
-    """`check_state` of droplets that keep their area, and what their arcs enclose, over what f_max allows."""
+    """`check_state` of droplets that keep their area."""
     positions, contacts, forces = state
-    radii = recording.radii
-    droplets = Droplets(positions, radii, recording.box, contacts, forces / gamma, recording.memory[step], recording.arcs)
-    pressed = droplets.force > 0
-    sums = radii[droplets.i] + radii[droplets.j]
-    scale = np.abs(sums - droplets.distance)[pressed].max(initial=0.0) or 1.0
-    law = max(np.abs(droplets.gap[pressed]).max(initial=0.0), np.abs(droplets.areas() / (2 * np.pi * radii)).max())
-    net, stress, force = droplets.net(), droplets.stress(), droplets.force
-    f_max = np.hypot(*net.T).max()
-    found = {
-        "droplets": droplets,
-        "eq4": law / scale,
-        "gap": min(droplets.gap[~pressed].min(initial=np.inf), droplets.far_gap()) / scale,
-        "force": forces.min(initial=np.inf),
-        "f_max": gamma * f_max,
-        "pressure": -0.5 * gamma * np.trace(stress),
-        "stress_xy": gamma * stress[0, 1],
-        "energy": gamma * droplets.energy(),
-        "coordination": coordination(len(radii), contacts),
-        "scale": scale,
-        "moment": np.abs(force * droplets.arm).max(initial=0.0),
-    }
-    # Arcs close but for the net force; what they enclose and how long they are is wrong by less.
-    allowed = promised(recording, f_max, scale, False) * scale + 1e-13
-    missed = max(droplets.pieces(p)[1] for p in range(len(radii)))
-    enclosed = [droplets.contour_area(p) for p in range(len(radii))] - np.pi * radii**2
-    length = sum(droplets.contour_length(p) - 2 * np.pi * radii[p] for p in range(len(radii)))
-    found["closed"] = missed / (radii.max() * f_max + allowed)
-    found["enclosed"] = np.abs(enclosed / (2 * np.pi * radii)).max() / (0.1 * radii.max() * f_max + allowed)
-    found["length"] = abs(length - droplets.energy()) / (0.01 * radii.sum() * f_max + (1 + force.sum()) * allowed)
-    return found
+    memory = recording.memory[step]
+    droplets = Droplets(positions, recording.radii, recording.box, contacts, forces / gamma, memory, recording.arcs)
+    found = droplets.residuals(lambda f_max, scale: promised(recording, f_max, scale, False) * scale)
+    of_forces = {name: gamma * found[name] for name in ("f_max", "pressure", "stress_xy", "energy")}
+    return found | of_forces | {"force": forces.min(initial=np.inf), "droplets": droplets}
 
 
 def promised(recording, f_max, scale, disks):
@@ -227,7 +201,8 @@ def check_contours(recording, state, found, strips, gamma):
         v = np.asarray(strip, dtype=float) - positions[p]
         if "droplets" in found:
             droplets = found["droplets"]
-            worst = max(worst, droplets.off_contour(p, v).max() - droplets.pieces(p)[1])
+            if found["f_max"] <= ARCS * gamma:
+                worst = np.maximum(worst, droplets.off_contour(p, v).max() - droplets.pieces(p)[1])
             continue
         theta = np.arctan2(v[:, 1], v[:, 0])
         rho = np.full(len(v), radii[p])
@@ -330,7 +305,7 @@ def check_beside(recording, step, state, found, gamma, single):
             dent = deepest(recording, found, forces, gamma, p)
             for printed, value, slack in ((words[1], pressure[p], 0), (words[5], dent, 0)):
                 # Three digits.
-                worst = max(worst, (abs(float(printed) - value) - 0.00501 * value - slack) / max(value, 1e-300))
+                worst = np.maximum(worst, (abs(float(printed) - value) - 0.00501 * value - slack) / max(value, 1e-300))
         count += images(strips, cells["/world/contours/images"], box, single, lambda s: s)
     return count, worst
 
@@ -393,25 +368,25 @@ def main():
         foam = recording.keeps_area and not disks
         found = check_foam(recording, step, state, gamma) if foam else check_state(recording, state, gamma, disks)
         allowed = promised(recording, found["f_max"] / gamma, found["scale"], disks)
-        worst["eq4"] = max(worst["eq4"], found["eq4"] / allowed)
-        worst["gap"] = max(worst["gap"], -found["gap"] / allowed)
-        worst["force"] = max(worst["force"], -found["force"])
+        worst["eq4"] = np.maximum(worst["eq4"], found["eq4"] / allowed)
+        worst["gap"] = np.maximum(worst["gap"], -found["gap"] / allowed)
+        worst["force"] = np.maximum(worst["force"], -found["force"])
         for name in ("closed", "enclosed", "length"):
-            worst[name] = max(worst[name], found.get(name, 0.0))
+            worst[name] = np.maximum(worst[name], found.get(name, 0.0))
         for name in ("f_max", "pressure", "energy", "stress_xy"):
             recorded = recording.metrics[name][step]
-            worst[name] = max(worst[name], abs(found[name] / gamma - recorded))
+            worst[name] = np.maximum(worst[name], abs(found[name] / gamma - recorded))
         recorded = recording.metrics["coordination"][step]
-        worst["coordination"] = max(worst["coordination"], abs(found["coordination"] - recorded))
+        worst["coordination"] = np.maximum(worst["coordination"], abs(coordination(len(recording.radii), state[1]) - recorded))
         if step in recording.contours:
             strips = recording.contours[step]
             vertices += sum(len(s) for s in strips)
             contour = check_contours(recording, state, found, strips, gamma)
-            worst["contour"] = max(worst["contour"], contour)
+            worst["contour"] = np.maximum(worst["contour"], contour)
         more, beside = check_beside(recording, step, state, found, gamma, single)
-        count, worst["beside"] = count + more, max(worst["beside"], beside)
+        count, worst["beside"] = count + more, np.maximum(worst["beside"], beside)
         latest += step not in recording.contours
-        worst["left"] = max(worst["left"], check_left_out(recording, step, state, gamma))
+        worst["left"] = np.maximum(worst["left"], check_left_out(recording, step, state, gamma))
     # Moments are balanced where a run has converged.
     balanced = recording.keeps_area and recording.metrics["f_max"][steps[-1]] <= recording.threshold
     worst["moment"] = found["moment"] / recording.threshold if balanced else 0.0

@@ -14,6 +14,8 @@ import numpy as np
 
 # A frame has a tilt of every pair nearer than this, in sums of radii; beyond FAR no two droplets touch.
 REACH, FAR = 1.3, 2.0
+# The net force up to which arcs are looked at; far from balance they run backwards.
+ARCS = 0.5
 
 
 def g(theta):
@@ -126,12 +128,6 @@ class Droplets:
         droplet = np.pi * (self.corner * self.y + (self.radii - self.corner) ** 2 / self.corner)
         return droplet.sum() + film.sum() - self.force @ self.along - 0.5 * self.give * (self.force**2).sum()
 
-    def perimeter(self):
-        """Sum of perimeters less that of undeformed circles."""
-        arcs = self.force * (longer(self.bend) + 1)
-        sides = np.bincount(self.i, arcs, len(self.radii)) + np.bincount(self.j, arcs, len(self.radii))
-        return (self.corner * (2 * np.pi + sides) - 2 * np.pi * self.radii).sum()
-
     def net(self):
         """Force on each droplet."""
         net, push = np.zeros((len(self.radii), 2)), self.force[:, None] * self.normal
@@ -167,7 +163,7 @@ class Droplets:
             arcs.append((first, last, angle - bend, angle + bend))
             begin, end = angle + bend, then - curve
             end += 2 * np.pi if then <= angle else 0.0
-            missed = max(missed, np.hypot(*(last + r * (unit(end) - unit(begin)) - after)))
+            missed = np.maximum(missed, np.hypot(*(last + r * (unit(end) - unit(begin)) - after)))
             arcs.append((last, after, begin, end))
         return arcs, missed
 
@@ -209,3 +205,33 @@ class Droplets:
                 within = np.abs(np.arctan2(np.sin(turned), np.cos(turned))) <= abs(half)
                 best = np.where(within, np.minimum(best, np.abs(np.hypot(*seen.T) - abs(radius))), best)
         return best
+
+    def residuals(self, promised):
+        """What there is to compare; what arcs are against what they should be, over what `promised(f_max, scale)`, a length, and f_max allow."""
+        radii, force, pressed, stress = self.radii, self.force, self.force > 0, self.stress()
+        depth = np.abs(radii[self.i] + radii[self.j] - self.distance)
+        scale = depth[pressed].max(initial=0.0) or 1.0
+        law = np.abs(np.concatenate([self.gap[pressed], self.areas() / (2 * np.pi * radii)])).max()
+        f_max = np.hypot(*self.net().T).max()
+        found = {
+            "eq4": law / scale,
+            "gap": np.append(self.gap[~pressed], self.far_gap()).min() / scale,
+            "f_max": f_max,
+            "pressure": -0.5 * np.trace(stress),
+            "stress_xy": stress[0, 1],
+            "energy": self.energy(),
+            "scale": scale,
+            "moment": np.abs(force * self.arm).max(initial=0.0),
+        }
+        if f_max > ARCS:
+            return found
+        # Arcs close but for the net force; what they enclose and how long they are is wrong by less. Soft contacts overlap by give f.
+        allowed, droplets = promised(f_max, scale) + 1e-13, range(len(radii))
+        missed = np.max([self.pieces(p)[1] for p in droplets])
+        enclosed = [self.contour_area(p) for p in droplets] - np.pi * radii**2
+        length = sum(self.contour_length(p) - 2 * np.pi * radii[p] for p in droplets)
+        off = length - self.energy() + 0.5 * self.give * (force**2).sum()
+        found["closed"] = missed / (radii.max() * f_max + allowed)
+        found["enclosed"] = np.abs(enclosed / (2 * np.pi * radii)).max() / (0.1 * radii.max() * f_max + allowed)
+        found["length"] = abs(off) / (0.01 * radii.sum() * f_max + (1 + force.sum()) * allowed)
+        return found
