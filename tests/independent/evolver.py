@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """Recorded packings of wet foam against K. Brakke's Surface Evolver, which knows lengths and areas and no forces.
 
-Of the last state only who touches whom is taken, and where films begin to begin with. Evolver then minimises the energy of edges that
-are arcs, of tension 2 between droplets and 1 elsewhere, whose ends slide, under the areas pi R^2 in the periodic box. Where the contact
-angle is 0 that minimum is none: a film that gets shorter than up to where its droplets part lets them overlap, and costs nothing to
-first and second order. So films have the tension 2 cos(angle), and energies, pressures and chords at several small angles, in which they
-are analytic, are extrapolated to 0.
+The last state gives who touches whom, and the shapes from which the minimisation starts. Evolver then minimises the energy of edges that
+are arcs, of tension 2 between two droplets and 1 elsewhere, whose ends slide, with areas pi R^2 in the periodic box.
+
+At a contact angle of 0 the foam is no isolated minimum of this energy, because Evolver lets droplets overlap: where a film gets shorter
+than it is in the foam, the energy falls with the third power. So films have the tension 2 cos(angle) with small angles. Energies,
+pressures and chords are analytic in the angle and are extrapolated to 0 by the polynomial through seven of them.
 
 Compared, to the limits that are printed, in units of gamma: energy (sum of perimeters less 2 pi R), osmotic pressure (2 sum p pi R^2 -
 energy of all edges)/2V, pressure of each droplet against 1/r, force of each contact against mean pressure times chord.
 
-Contact angles go up to --angle (radians), which films have to be found from: 0.04 for a packing of rounded polygons, which is told.
+The largest contact angle is --angle (radians). Newton's method starts from shapes that must be right to a part of it: 0.008 suits wet foam;
+a packing of rounded polygons, which this check refuses, needs 0.04.
 
 usage: evolver.py [--angle X] RUN.rrd ...      (apt-get install evolver; pip install rerun-sdk==0.36.3 numpy)
 """
