@@ -23,6 +23,7 @@ Examples:
   softjam figure run.rrd --width 86mm -o column.pdf       for one column of a journal
   softjam figure run.rrd --range 0..2 -o same-scale.svg   a colour scale that several figures share
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
+  softjam figure foam.rrd --films --color nothing --no-chains -o films.svg      droplets that keep their area, and the films between
   softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
   softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
   softjam figure run.rrd --color nothing --no-chains -o figure5b.svg                       and 5(b)
@@ -39,7 +40,7 @@ pub struct Arguments {
     output: PathBuf,
 
     /// Draw f_max (units of γ) against step instead of a packing, with the thresholds as dashed lines.
-    #[arg(long, conflicts_with_all = ["step", "disks", "color", "range", "no_chains"])]
+    #[arg(long, conflicts_with_all = ["step", "disks", "color", "range", "no_chains", "films"])]
     fmax: bool,
 
     /// The recorded step to draw: a number or `last`.
@@ -63,6 +64,11 @@ pub struct Arguments {
     /// Leave out the force chains: lines between centres, as wide as the force.
     #[arg(long)]
     no_chains: bool,
+
+    /// Draw the contacts of droplets that keep their area (rounded-polygon, wet-foam) as the films that they are, coloured by how much
+    /// the pressures on their two sides differ: |1/r_i − 1/r_j| in units of γ and the mean radius.
+    #[arg(long, conflicts_with = "disks")]
+    films: bool,
 
     /// Width of the figure, in mm, cm, in, pt or px (96 an inch): 86mm is one column of many journals, 178mm two. Text is 8
     /// points in narrow figures and 10 in wide ones [default: 668px, with --fmax 720px].
@@ -227,6 +233,7 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
                 },
                 color: arguments.color,
                 chains: !arguments.no_chains,
+                films: arguments.films,
                 width: arguments.width.unwrap_or(Style::default().width),
                 range: arguments.range,
             };
@@ -235,6 +242,12 @@ fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {
                 format!(
                     "step {} of {shown} is of disks, which keep their shape: --color deformation has nothing to show",
                     frame.step
+                )
+            } else if style.films && !matches!(model, Kind::RoundedPolygon | Kind::WetFoam) {
+                format!(
+                    "step {} of {shown} is of the model {}: --films is for rounded-polygon and wet-foam, whose droplets keep their area",
+                    frame.step,
+                    model.name()
                 )
             } else {
                 let packing = recording.packing(&frame)?;

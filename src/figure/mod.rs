@@ -16,7 +16,9 @@
 //! ```
 
 mod axis;
+mod bar;
 mod chart;
+mod films;
 mod keys;
 mod legend;
 mod packing;
@@ -24,6 +26,7 @@ mod pdf;
 mod relaxation;
 mod shades;
 mod shapes;
+mod sheet;
 
 pub use axis::{Axis, Scale};
 pub use chart::{CHART_WIDTH, CURVE_COLORS, Curve, Mark, chart, chart_in};
@@ -254,6 +257,10 @@ fn check_numbers(svg: &str) -> Result<(), FigureError> {
         return Err(FigureError::Draw(problem));
     }
     Ok(())
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// A number as `9.6·10⁻¹¹`.

@@ -1,14 +1,16 @@
 //! A packing: particles as filled shapes, contacts as force chains.
 
+use super::films::Films;
 use super::legend::{Legend, length};
 use super::shades::{PALE, Shades};
 use super::shapes::{circle, frame as framed, hundredths, line, page, paper, rectangle};
-use super::{INK, font_size, power_of_ten, with_f_max};
+use super::sheet::Sheet;
+use super::{INK, font_size, mean, power_of_ten, with_f_max};
 use crate::analysis::FrameForces;
 use crate::contacts::{Contacts, FrameContacts};
-use crate::domain::{Domain, Vec2};
+use crate::domain::Vec2;
 use crate::models::Kind;
-use crate::models::droplet::contour::{ContourStyle, Contours, Placement};
+use crate::models::droplet::contour::{Arc, ContourStyle, Contours, Placement};
 use crate::scene::Scene;
 use crate::state::Frame;
 use crate::state::Packing;
@@ -26,7 +28,7 @@ use svg::node::element::{ClipPath, Definitions, Group, Path};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// Its contour `ρ_i(θ)`; the disk where the model is one of disks.
+    /// Its contour `ρ_i(θ)`, which is made of arcs where a droplet keeps its area and is in balance; the disk where the model is one of disks.
     #[default]
     Contour,
     /// The undeformed disk of the same frame.
@@ -65,6 +67,9 @@ pub struct Style {
     pub color: ColorBy,
     /// Whether contacts are drawn, their width by the force.
     pub chains: bool,
+    /// Whether contacts of droplets that keep their area are drawn as the films they are, their colour by the difference of the
+    /// pressures on their sides.
+    pub films: bool,
     /// Width of the figure (pixels of the SVG, 96 an inch); text is 8 points in narrow figures and 10 in wide ones.
     pub width: f64,
     /// The values at the ends of the colour bar, ascending; without them round numbers around the values of all but the last
@@ -78,6 +83,7 @@ impl Default for Style {
             shape: Shape::default(),
             color: ColorBy::default(),
             chains: true,
+            films: false,
             width: 668.0,
             range: None,
         }
@@ -86,13 +92,15 @@ impl Default for Style {
 
 /// How far the chords of a contour are off (pixels).
 const CHORD: f64 = 0.05;
-const MARGIN: f64 = 14.0;
 /// The width of a chain that bears the mean force: in mean radii, and at most in pixels.
 const CHAIN: (f64, f64) = (0.08, 2.2);
 /// The force above which chains become no wider (means).
 const STRONGEST: f64 = 3.0;
 /// The width of an outline, likewise.
 const OUTLINE: (f64, f64) = (0.03, 1.2);
+
+/// The width of a film, in those of an outline.
+const FILM: f64 = 3.0;
 
 /// Draws `frame` of a run of `scene`; `packing` gives radii and box.
 ///
@@ -129,6 +137,10 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     let mut inside = Group::new()
         .set("clip-path", "url(#box)")
         .add(particles.set("stroke-width", thin));
+    let films = Films::of(&contours, packing.radii()).filter(|_| style.films);
+    if let Some(films) = &films {
+        inside.append(films.draw(&sheet, &frame.positions, FILM * thin));
+    }
     let chains = Chains::of(&sheet, radius, &contacts).filter(|_| style.chains);
     if let Some(chains) = &chains {
         inside.append(chains.draw(&sheet, frame, &contacts));
@@ -145,7 +157,10 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
         (Kind::MorseWitten, Shape::Contour) => {}
     }
     legend.lines(&pieces, ", ", 1.0);
-    shades.bar(&mut legend);
+    shades.key(&mut legend);
+    if let Some(films) = &films {
+        films.key(&mut legend);
+    }
     if let Some(chains) = &chains {
         chains.key(&mut legend);
     }
@@ -175,7 +190,14 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
 
 /// Physical quantities in italics, as they are printed.
 fn symbols(svg: &str, size: f64) -> String {
-    const QUANTITIES: [&str; 5] = ["N =", "φ =", "p / ⟨p⟩", "f / ⟨f⟩", "|ΔR| / R"];
+    const QUANTITIES: [&str; 6] = [
+        "N =",
+        "φ =",
+        "p / ⟨p⟩",
+        "f / ⟨f⟩",
+        "|ΔR| / R",
+        "|Δp| ⟨R⟩ / γ",
+    ];
     let italic = |text: &str| {
         let letter = |c: char| c.is_alphabetic() && c != 'Δ';
         let words = text.chars().map(|c| match c {
@@ -204,9 +226,13 @@ fn particles(
         let fill = shades.fill(p);
         if shape == Shape::Contour {
             let outline = contours.polygon(p);
+            let arcs = contours.arcs(p, radius);
             for shift in sheet.images(outline) {
-                let points = outline.iter().map(|v| sheet.place(v + shift));
-                particles.append(polygon(points).set("fill", fill.as_str()));
+                let path = match &arcs {
+                    Some(arcs) => closed(sheet, arcs, center + shift),
+                    None => polygon(outline.iter().map(|v| sheet.place(v + shift))),
+                };
+                particles.append(path.set("fill", fill.as_str()));
             }
         } else {
             let corner = Vec2::repeat(radius);
@@ -237,10 +263,6 @@ fn rattlers(count: usize, outline: f64, legend: &mut Legend) {
     legend.write(&text, (left + 1.7 * font, middle), "start");
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
 /// So many vertices that the chords of a circle of this radius (pixels) are off by no more than [`CHORD`].
 fn vertices(radius: f64) -> usize {
     let sides = PI / (2.0 * CHORD / radius.max(1e-3)).sqrt();
@@ -257,6 +279,17 @@ fn polygon(points: impl Iterator<Item = (f64, f64)>) -> Path {
             data.line_to(point)
         };
     }
+    Path::new().set("d", data.close())
+}
+
+/// A closed contour of arcs around `center`, to a hundredth of a pixel.
+fn closed(sheet: &Sheet, arcs: &[Arc], center: Vec2) -> Path {
+    let first = arcs.first().map_or(center, |arc| center + arc.ends[0]);
+    let data = arcs
+        .iter()
+        .fold(Data::new().move_to(sheet.place(first)), |path, arc| {
+            sheet.follow(path, arc, center)
+        });
     Path::new().set("d", data.close())
 }
 
@@ -328,55 +361,4 @@ fn caption(packing: &Packing, frame: &Frame, scene: &Scene) -> Vec<String> {
         caption.push(format!("f_max = {f_max} γ"));
     }
     caption
-}
-
-/// Where the box lies on the sheet.
-struct Sheet {
-    scale: f64,
-    domain: Domain,
-    height: f64,
-}
-
-impl Sheet {
-    /// `width` is that of the whole figure.
-    fn of(domain: Domain, width: f64) -> Self {
-        let lengths = domain.lengths();
-        let scale = (width - 2.0 * MARGIN) / lengths.x;
-        Self {
-            scale,
-            domain,
-            height: scale * lengths.y + 2.0 * MARGIN,
-        }
-    }
-
-    fn pixels(&self, length: f64) -> f64 {
-        hundredths(self.scale * length)
-    }
-
-    /// Left, top, width and height of the box.
-    fn frame(&self) -> (f64, f64, f64, f64) {
-        let l = self.domain.lengths();
-        (MARGIN, MARGIN, self.pixels(l.x), self.pixels(l.y))
-    }
-
-    /// A point of the packing, whose y points up.
-    fn place(&self, v: Vec2) -> (f64, f64) {
-        let y = self.height - MARGIN - self.scale * v.y;
-        (hundredths(MARGIN + self.scale * v.x), hundredths(y))
-    }
-
-    /// The shifts by a period that bring a shape into the box.
-    fn images(&self, points: &[Vec2]) -> Vec<Vec2> {
-        let (mut least, mut most) = (Vec2::repeat(f64::MAX), Vec2::repeat(f64::MIN));
-        for p in points {
-            least = least.inf(p);
-            most = most.sup(p);
-        }
-        let l = self.domain.lengths();
-        let meets = |shift: &Vec2| {
-            let (a, b) = (least + shift, most + shift);
-            a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0
-        };
-        self.domain.around().filter(meets).collect()
-    }
 }

@@ -18,6 +18,7 @@
 //! Near a contact the notches of the two particles overlap in a thin lens of half-width `f R_eff/γ` and depth
 //! `f² R_eff/4γ²`, `R_eff = 2 R_i R_j/(R_i + R_j)`: that is what the linear model says, and it is drawn as it is.
 
+pub use super::arc::{Arc, FilmArc};
 use super::foam::Foam;
 use super::kernel::{Angles, Direction};
 use super::outline::{Circle, Outline};
@@ -204,7 +205,7 @@ impl Contours {
         mut drawn: impl FnMut(&mut Vec<V>, usize, Extent),
     ) {
         assert_eq!(radii.len(), positions.len(), "one radius a particle");
-        if let Some(foam) = self.foam.as_ref().filter(|_| !self.circles) {
+        if let Some(foam) = self.foam.as_deref().filter(|_| !self.circles) {
             self.evaluations += foam.trace(radii, positions, self.style.vertices, vertices, drawn);
             return;
         }
@@ -305,6 +306,44 @@ impl Contours {
     #[must_use]
     pub fn polygon(&self, p: usize) -> &[Vec2] {
         &self.vertices[self.first[p]..self.first[p + 1]]
+    }
+
+    /// The contour of particle `p`, of undeformed `radius`, as arcs, anticlockwise and seen from its centre. `None` for models that do not keep the
+    /// area, and on the way to balance.
+    ///
+    /// # Panics
+    ///
+    /// If there is no particle `p`.
+    #[must_use]
+    pub fn arcs(&self, p: usize, radius: f64) -> Option<Vec<Arc>> {
+        self.foam_told()?.arcs(p, radius)
+    }
+
+    /// The contacts of particles of undeformed `radii`, in the order of their pairs; none for models that do not keep their area.
+    ///
+    /// ```
+    /// use softjam::{models::{Kind, droplet::contour::ContourStyle}, protocol::{Relaxation, Status}, scene::Scene};
+    ///
+    /// let scene = Scene { particles: 32, phi: 0.92, model: Kind::WetFoam, ..Scene::default() };
+    /// let mut run = Relaxation::new(&scene).unwrap();
+    /// while run.status() == Status::Running {
+    ///     run.advance().unwrap();
+    /// }
+    /// let mut contours = Kind::WetFoam.contours(ContourStyle::default(), 1.0);
+    /// contours.tell(run.packing(), &run.frame());
+    /// // Young and Laplace: a film has two sides.
+    /// let films = contours.films(run.packing().radii());
+    /// assert_eq!(films.len(), run.contacts().pairs.len());
+    /// assert!(films.iter().all(|film| (film.arc.curvature() - 0.5 * film.pressure).abs() < 1e-12));
+    /// ```
+    #[must_use]
+    pub fn films(&self, radii: &[f64]) -> Vec<FilmArc> {
+        let foam = self.foam_told();
+        foam.map_or_else(Vec::new, |foam| foam.film_arcs(radii))
+    }
+
+    fn foam_told(&self) -> Option<&Foam> {
+        self.foam.as_deref().filter(|_| !self.circles)
     }
 
     /// Number of vertices of all polygons.

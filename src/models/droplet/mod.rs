@@ -53,6 +53,7 @@
 //! | 1.00 | 0.076 | 0.38 | 0.021 | 0.095 | −0.028 % | −0.50 % | 5.938 | 5.969 |
 
 mod angle;
+mod arc;
 mod check;
 pub mod contact;
 pub mod contour;

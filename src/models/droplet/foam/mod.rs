@@ -41,6 +41,8 @@ mod outline;
 mod state;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_contours;
 mod tilts;
 
 pub use state::Films;
