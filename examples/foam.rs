@@ -71,7 +71,7 @@ fn relaxed(
 
 /// Pictures side by side, each below its title.
 fn row(panels: &[(&str, String)]) -> Result<String, Box<dyn Error>> {
-    let (mut inside, mut height, mut x) = (String::new(), 0.0_f64, 0);
+    let (mut inside, mut height, mut x) = (Vec::new(), 0.0_f64, 0);
     for (title, svg) in panels {
         let after = svg.split(" height=\"").nth(1);
         let number = after.and_then(|rest| rest.split('"').next());
@@ -85,12 +85,12 @@ fn row(panels: &[(&str, String)]) -> Result<String, Box<dyn Error>> {
             .replace("\"box\"", &format!("\"box{x}\""));
         let svg = svg.replace("#box", &format!("#box{x}"));
         let middle = x + PANEL / 2;
-        inside += &format!(
+        inside.push(format!(
             "<text x=\"{middle}\" y=\"20\" text-anchor=\"middle\" font-size=\"16\">{title}</text>\n{svg}\n"
-        );
+        ));
         x += PANEL;
     }
-    let height = height + f64::from(TITLE);
+    let (inside, height) = (inside.concat(), height + f64::from(TITLE));
     Ok(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{x}\" height=\"{height}\" viewBox=\"0 0 {x} {height}\" \
          font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{inside}</svg>\n"

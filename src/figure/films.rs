@@ -14,7 +14,7 @@ const EQUAL: f64 = 1e-9;
 
 /// The films of a packing, whose colour says how much the pressures on their two sides differ.
 pub(super) struct Films {
-    films: Vec<FilmArc>,
+    arcs: Vec<FilmArc>,
     /// The mean radius, by which a pressure times a length becomes a number (length).
     radius: f64,
     bar: Bar,
@@ -23,15 +23,15 @@ pub(super) struct Films {
 impl Films {
     /// Nothing where there is no film.
     pub fn of(contours: &Contours, radii: &[f64]) -> Option<Self> {
-        let films = contours.films(radii);
+        let arcs = contours.films(radii);
         let radius = super::mean(radii);
         // What rounding makes of equal pressures is no range for colours.
-        let differences = films.iter().map(|film| film.pressure * radius);
+        let differences = arcs.iter().map(|film| film.pressure * radius);
         let differences: Vec<f64> = differences
             .map(|d| if d < EQUAL { 0.0 } else { d })
             .collect();
-        (!films.is_empty()).then(|| Self {
-            films,
+        (!arcs.is_empty()).then(|| Self {
+            arcs,
             radius,
             bar: Bar::of("|Δp| ⟨R⟩ / γ", &differences, None, shade),
         })
@@ -42,7 +42,7 @@ impl Films {
         let mut group = Group::new()
             .set("fill", "none")
             .set("stroke-width", super::hundredths(width));
-        for film in &self.films {
+        for film in &self.arcs {
             let center = positions[film.particle];
             let [first, second] = film.arc.halves().map(|half| half.ends.map(|v| v + center));
             for shift in sheet.images(&[first, second].concat()) {

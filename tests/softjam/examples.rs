@@ -143,6 +143,22 @@ fn figure6_falls_to_the_threshold_in_as_many_steps_as_the_program_takes() {
 }
 
 #[test]
+fn foam_pushes_harder_than_its_linear_model() {
+    let folder = Folder::new();
+    let table = rows(&run("foam", folder.path(), &[]));
+    is_the_committed_one(folder.path(), "models.svg");
+    is_the_committed_one(folder.path(), "foam.svg");
+    let [disks, linear, foam, dry] = &table[..] else {
+        panic!("{table:?}")
+    };
+    assert!([disks, linear, foam].iter().all(|row| row[0] == 0.95));
+    // 45 % below the foam.
+    assert_within("linear over exact", linear[2] / foam[2], 0.5, 0.6);
+    // Few gaps are left: almost all vertices join three droplets, and then Z is 6.
+    assert_within("Z at φ = 0.99", dry[1], 5.9, 6.0);
+}
+
+#[test]
 fn squeeze_meets_the_exact_droplet_in_the_linear_range_and_leaves_it_as_known() {
     let folder = Folder::new();
     let table = rows(&run("squeeze", folder.path(), &[]));

@@ -4,8 +4,9 @@ use softjam::domain::{Domain, Vec2};
 use softjam::figure::{
     Axis, ColorBy, Curve, Fall, Shape, Style, chart, packing as draw, pdf, png, relaxation,
 };
+use softjam::models::Kind;
 use softjam::models::droplet::contact::ContactLaw;
-use softjam::protocol::Relaxation;
+use softjam::protocol::{Relaxation, Status};
 use softjam::scene::Scene;
 use softjam::state::Frame;
 use softjam::state::Packing;
@@ -108,6 +109,66 @@ fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
         svg.contains("x1=\"474\"") && svg.contains("x2=\"554\""),
         "{svg}"
     );
+}
+
+/// The arcs of a path: where each begins and ends, its radius, and whether it goes clockwise.
+fn arcs(data: &str) -> Vec<([f64; 4], f64, bool)> {
+    let mut at = vec![];
+    let mut arcs = vec![];
+    for word in data.split_whitespace() {
+        let numbers: Vec<f64> = word[1..]
+            .split(',')
+            .filter_map(|n| n.parse().ok())
+            .collect();
+        if let [radius, _, _, _, sweep, x, y] = numbers[..] {
+            arcs.push(([at[0], at[1], x, y], radius, sweep == 1.0));
+        }
+        if !numbers.is_empty() {
+            at = numbers[numbers.len() - 2..].to_vec();
+        }
+    }
+    arcs
+}
+
+#[test]
+fn both_droplets_of_a_film_are_drawn_with_its_arc() {
+    let scene = Scene {
+        particles: 32,
+        phi: 0.95,
+        model: Kind::WetFoam,
+        ..Scene::default()
+    };
+    let mut run = Relaxation::new(&scene).unwrap();
+    while run.status() == Status::Running {
+        run.advance().unwrap();
+    }
+    let style = |films| Style {
+        films,
+        ..Style::default()
+    };
+    let draw = |films| draw(run.packing(), &run.frame(), &scene, &style(films));
+    let (plain, with_films) = (draw(false), draw(true));
+    let all: Vec<_> = plain.split(" d=\"").skip(1).collect();
+    let all = all
+        .iter()
+        .flat_map(|rest| arcs(rest.split('"').next().unwrap()));
+    let all: Vec<_> = all.collect();
+    // The larger of the two pressures pushes an arc into the other droplet: there it goes clockwise.
+    let hollow = all.iter().filter(|arc| arc.2);
+    let mut films: Vec<String> = vec![];
+    for ([a, b, c, d], radius, _) in hollow {
+        let back = all.iter().find(|arc| arc.0 == [*c, *d, *a, *b]);
+        if let Some((_, of_back, clockwise)) = back {
+            assert!(of_back == radius && !clockwise);
+            films.push(format!("M{c},{d} A{radius},{radius},0,0,0,{a},{b}"));
+        }
+    }
+    let contacts = run.contacts().pairs.len();
+    assert!(films.len() > contacts * 9 / 10, "{} films", films.len());
+    // Arcs of the film and of the contour are the same.
+    let drawn = films.iter().filter(|film| with_films.contains(*film));
+    assert!(drawn.count() > contacts * 9 / 10);
+    assert!(with_films.contains('Δ') && !plain.contains('Δ'));
 }
 
 #[test]

@@ -74,7 +74,10 @@ fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
     record(folder.path(), "a.rrd", &[]);
     record(folder.path(), "b.mcap", &["--seed", "2"]);
     record(folder.path(), "m.rrd", &["--channels", "metrics"]);
-    let drawn: [&[&str]; 7] = [
+    let foam = ["--model", "wet-foam", "--phi", "0.9"];
+    record(folder.path(), "foam.rrd", &foam);
+    let drawn: [&[&str]; 8] = [
+        &["foam.rrd", "--films", "--color", "nothing", "-o", "f.pdf"],
         &["a.rrd", "-o", "a.svg"],
         &[
             "a.rrd", "--width", "86mm", "--range", "0.5,1.5", "-o", "a.pdf",
@@ -107,7 +110,11 @@ fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
     let pdf = std::fs::read(folder.path().join("a.pdf")).expect("a.pdf");
     let page = b"/MediaBox [0 0 243.78 ";
     assert!(pdf.windows(page.len()).any(|bytes| bytes == page));
-    let refused: [(&[&str], &str); 11] = [
+    let refused: [(&[&str], &str); 12] = [
+        (
+            &["a.rrd", "--films", "-o", "x.svg"],
+            "--films is for rounded-polygon and wet-foam",
+        ),
         (&["a.rrd", "-o", "a.svg"], "a.svg exists"),
         (&["a.rrd", "-o", "x.gif"], ".svg, .pdf or .png"),
         (&["a.rrd", "--range", "2..1", "-o", "x.svg"], "is empty"),

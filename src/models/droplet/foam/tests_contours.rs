@@ -132,8 +132,8 @@ fn droplets_in_balance_are_closed_by_arcs_with_one_tangent_and_have_their_area()
     for (model, phi) in relaxations() {
         let (packing, foam, contours) = relaxed(model, phi);
         let mut films = 0.0_f64;
-        for (p, contour) in contours.iter().enumerate() {
-            let disk = PI * packing.radii()[p].powi(2);
+        for (p, (contour, radius)) in contours.iter().zip(packing.radii()).enumerate() {
+            let disk = PI * radius * radius;
             let area: f64 = contour.iter().map(area).sum();
             assert!((area / disk - 1.0).abs() < 1e-12, "{model:?} {phi}: {p}");
             let bulges = contour.iter().step_by(2).map(|film| segment(film) / disk);
