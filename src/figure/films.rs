@@ -41,7 +41,9 @@ impl Films {
     pub fn draw(&self, sheet: &Sheet, positions: &[Vec2], width: f64) -> Group {
         let mut group = Group::new()
             .set("fill", "none")
-            .set("stroke-width", super::hundredths(width));
+            .set("stroke-width", super::hundredths(width))
+            // So that a weak contact is a dot.
+            .set("stroke-linecap", "round");
         for film in &self.arcs {
             let center = positions[film.particle];
             let [first, second] = film.arc.halves().map(|half| half.ends.map(|v| v + center));

@@ -74,7 +74,7 @@ fn figures_are_drawn_of_what_is_recorded_and_what_is_not_is_named() {
     record(folder.path(), "a.rrd", &[]);
     record(folder.path(), "b.mcap", &["--seed", "2"]);
     record(folder.path(), "m.rrd", &["--channels", "metrics"]);
-    let foam = ["--model", "wet-foam", "--phi", "0.9"];
+    let foam = ["--model", "wet-foam"];
     record(folder.path(), "foam.rrd", &foam);
     let drawn: [&[&str]; 8] = [
         &["foam.rrd", "--films", "--color", "nothing", "-o", "f.pdf"],
