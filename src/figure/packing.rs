@@ -67,8 +67,8 @@ pub struct Style {
     pub color: ColorBy,
     /// Whether contacts are drawn, their width by the force.
     pub chains: bool,
-    /// Whether contacts of droplets that keep their area are drawn as the films they are, their colour by the difference of the
-    /// pressures on their sides.
+    /// Whether contacts of droplets that keep their area are drawn as the films that they are, their colour by the difference of the
+    /// pressures on their two sides; not with disks.
     pub films: bool,
     /// Width of the figure (pixels of the SVG, 96 an inch); text is 8 points in narrow figures and 10 in wide ones.
     pub width: f64,
@@ -98,7 +98,6 @@ const CHAIN: (f64, f64) = (0.08, 2.2);
 const STRONGEST: f64 = 3.0;
 /// The width of an outline, likewise.
 const OUTLINE: (f64, f64) = (0.03, 1.2);
-
 /// The width of a film, in those of an outline.
 const FILM: f64 = 3.0;
 
@@ -137,7 +136,8 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     let mut inside = Group::new()
         .set("clip-path", "url(#box)")
         .add(particles.set("stroke-width", thin));
-    let films = Films::of(&contours, packing.radii()).filter(|_| style.films);
+    let as_films = style.films && shape == Shape::Contour;
+    let films = Films::of(&contours, packing.radii()).filter(|_| as_films);
     if let Some(films) = &films {
         inside.append(films.draw(&sheet, &frame.positions, FILM * thin));
     }

@@ -13,6 +13,7 @@ use core::f64::consts::PI;
 const PLAIN: &str = "#cfdfe8";
 /// The colour of a rattler.
 pub(super) const PALE: &str = "#f4f4f4";
+
 /// The colours of the particles.
 pub(super) struct Shades {
     values: Vec<f64>,
