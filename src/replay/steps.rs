@@ -10,6 +10,8 @@ pub(super) struct Steps {
     /// Step and stage of the last state that was accepted.
     last: Option<(u64, u32)>,
     off_schedule: bool,
+    /// Whether there is a protocol, whose relaxed states are recorded at whatever step they are.
+    any: bool,
 }
 
 impl Steps {
@@ -20,6 +22,7 @@ impl Steps {
             first,
             last: None,
             off_schedule: false,
+            any: !scene.protocol.is_empty(),
         }
     }
 
@@ -57,7 +60,7 @@ impl Steps {
             ));
         }
         // The first state of a stage is on no schedule.
-        self.off_schedule = expected != Some(step) && stage == before;
+        self.off_schedule = expected != Some(step) && stage == before && !self.any;
         self.last = Some((step, stage));
         Ok(())
     }
