@@ -62,7 +62,7 @@ impl Progress {
     pub fn from_values(values: &[f64], act: Act, particles: usize) -> Option<Self> {
         let (of_all, known) = values.split_first_chunk::<OF_ALL>()?;
         let &[strain, count, began, strain_before, phi_before, x, y, tilt] = of_all;
-        let whole = |n: f64| (n >= 0.0 && n < 9e15 && n == libm::floor(n)).then_some(n as u64);
+        let whole = |n: f64| ((0.0..9e15).contains(&n) && n == libm::floor(n)).then_some(n as u64);
         let lengths: &[usize] = match act {
             Act::Compress {
                 until: Until::Pressure(_),

@@ -31,8 +31,9 @@ pub(super) struct Rows {
     format: u32,
     contours: StageContours,
     redraw: Redraw,
-    /// The box drawn last, in a recording whose box changes.
-    drawn_box: Option<Option<Domain>>,
+    /// Whether the box is drawn where it changes, and the one drawn last.
+    draws_boxes: bool,
+    drawn_box: Option<Domain>,
     patience: Patience,
     /// Whether there was a batch.
     begun: bool,
@@ -75,7 +76,8 @@ impl Rows {
             format: header.format,
             contours: StageContours::of(&header.scene),
             redraw: Redraw::new(&header),
-            drawn_box: (!header.scene.protocol.is_empty()).then_some(None),
+            draws_boxes: !header.scene.protocol.is_empty(),
+            drawn_box: None,
             patience: Patience::of(&header, BATCH_MOVES),
             begun: false,
             packing: header.packing,
@@ -137,10 +139,10 @@ impl Rows {
             self.redraw.enter(domain);
         }
         let domain = self.packing.domain();
-        if self.drawn_box.is_some_and(|drawn| drawn != Some(domain)) {
+        if self.draws_boxes && self.drawn_box != Some(domain) {
             let row = (snapshot.step, snapshot.nanoseconds, domain);
             self.pending.boxes.push(row);
-            self.drawn_box = Some(Some(domain));
+            self.drawn_box = Some(domain);
         }
         let particles = self.redraw.particles(snapshot, frame);
         let network = self.redraw.contacts(snapshot, frame);

@@ -32,7 +32,7 @@ enum First {
         packing: Packing,
         frame: Box<Frame>,
         /// The scene before, if it is changed at the frame.
-        before: Option<Scene>,
+        before: Option<Box<Scene>>,
     },
 }
 
@@ -128,7 +128,7 @@ impl Origin {
         let first = First::Frame {
             packing,
             frame,
-            before: changed.then(|| recording.scene().clone()),
+            before: changed.then(|| Box::new(recording.scene().clone())),
         };
         Ok(Self { scene, legs, first })
     }

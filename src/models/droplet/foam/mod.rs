@@ -65,6 +65,9 @@ const SOFT: f64 = 0.05;
 const SOFTER: usize = 12;
 const HARDENS: f64 = 1e-2;
 
+/// The least violation of the contact law, relative to the largest `|δ|`, that is asked for: what rounding leaves of gaps.
+const LEAST_TOLERANCE: f64 = 1e-13;
+
 /// Sweeps over all tilts that a start may take; each takes a contact problem.
 const SWEEPS: usize = 200;
 
@@ -95,13 +98,14 @@ pub struct Foam {
 }
 
 impl Foam {
-    /// Droplets of line tension γ (force) with such films, whose contact law is solved to `tolerance` (relative to the largest `|δ|`) in balance.
+    /// Droplets of line tension γ (force) with such films, whose contact law is solved to `tolerance` (relative to the largest `|δ|`, not below
+    /// 1e-13) in balance.
     #[must_use]
     pub fn new(films: Films, line_tension: f64, tolerance: f64) -> Self {
         Self {
             films,
             line_tension,
-            tolerance,
+            tolerance: tolerance.max(LEAST_TOLERANCE),
             near: NeighborList::new(),
             lines: Lines::default(),
             tilts: Vec::new(),
