@@ -26,13 +26,12 @@
 
 use crate::analysis::{METRICS, Metrics, metrics_of};
 use crate::minimize::dt_and_time;
-use crate::models::Kind;
 use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{
     Header, Outcome, PROGRAM, RecordError, Snapshot, Snapshots, Writer, Written, nanoseconds,
 };
 use crate::replay::{Event, ReadError, Recording};
-use crate::scene::{Channels, SceneError, Schedule};
+use crate::scene::{Channels, Scene, SceneError, Schedule};
 use crate::state::Frame;
 use crate::text::counted;
 use crate::text::shown;
@@ -145,7 +144,7 @@ pub fn convert(
         first: recording.from_step(),
         has_states: recording.scene().channels.state.is_on(),
         stage: 0,
-        model: recording.scene().model,
+        has: metrics_at(recording.scene(), recording.scene().last_stage()),
         waiting: BTreeMap::new(),
         last: None,
         rebuilt: 0,
@@ -201,9 +200,9 @@ struct Conversion {
     first: u64,
     /// Whether there are states to wait for.
     has_states: bool,
-    /// The stage of the last recorded frame, and its model; that of the scene before the first.
+    /// The stage of the last recorded frame, and which metrics it has; those of the last stage before the first.
     stage: u32,
-    model: Kind,
+    has: [bool; METRICS.len()],
     /// Metrics of steps that are not written yet.
     waiting: BTreeMap<u64, Row>,
     /// The last recorded frame; not written yet, since the last of all is written by every channel.
@@ -218,10 +217,17 @@ struct Row {
     values: [Option<f64>; METRICS.len()],
 }
 
+/// Which metrics the rows of a stage have.
+fn metrics_at(scene: &Scene, stage: u32) -> [bool; METRICS.len()] {
+    let is_of_disks = stage == 0 && scene.records_disks();
+    let is_strained = !scene.protocol.is_empty() && !is_of_disks;
+    metrics_of(scene.stage(stage).model, is_strained)
+}
+
 impl Row {
-    /// The metrics, if all are there that `model` has.
-    fn whole(&self, model: Kind) -> Option<Metrics> {
-        let mut had = self.values.iter().zip(metrics_of(model));
+    /// The metrics, if all are there that a row `has`.
+    fn whole(&self, has: &[bool; METRICS.len()]) -> Option<Metrics> {
+        let mut had = self.values.iter().zip(has);
         had.all(|(value, has)| value.is_some() || !has)
             .then_some(self.values)
     }
@@ -288,7 +294,7 @@ impl Conversion {
         let mut step = asks(metrics);
         while let Some(k) = step.filter(|k| *k < until) {
             let row = self.waiting.get(&k);
-            if row.and_then(|row| row.whole(self.model)).is_none() {
+            if row.and_then(|row| row.whole(&self.has)).is_none() {
                 return true;
             }
             step = metrics.after(k);
@@ -338,20 +344,28 @@ impl Conversion {
     ) -> Result<(), ConvertError> {
         let step = frame.step;
         let begins_stage = core::mem::replace(&mut self.stage, frame.stage) != frame.stage;
-        let edge = last || step == self.first || begins_stage;
+        let again = || -> Result<Relaxation, ConvertError> {
+            let packing = recording.packing(frame)?;
+            Ok(Relaxation::resume(
+                recording.scene(),
+                packing,
+                frame.clone(),
+            )?)
+        };
+        // Which states a protocol has relaxed, and where its stages end, is not told by a frame alone.
+        let of_protocol = (!recording.scene().protocol.is_empty()).then(again);
+        let of_protocol = of_protocol.transpose()?;
+        let is_relaxed = (of_protocol.as_ref()).is_some_and(Relaxation::is_relaxed_state);
+        let edge = last || step == self.first || begins_stage || is_relaxed;
         let channels = recording.scene().scheduled(&self.channels, frame.stage);
         let [contours, contacts, metrics, state] = channels.at(step, edge);
-        self.model = recording.scene().stage(frame.stage).model;
+        self.has = metrics_at(recording.scene(), frame.stage);
         let row = self.waiting.get(&step);
-        let row = row.and_then(|row| row.whole(self.model));
+        let row = row.and_then(|row| row.whole(&self.has));
         let metrics = match (metrics, row) {
             (false, _) => None,
             (true, Some(recorded)) => Some(recorded),
-            (true, None) => {
-                let packing = recording.packing(frame)?;
-                let run = Relaxation::resume(recording.scene(), packing, frame.clone())?;
-                Some(run.observables().metrics())
-            }
+            (true, None) => Some(again()?.observables().metrics()),
         };
         let pictured = contours || contacts || state;
         if pictured || metrics.is_some() {
@@ -364,6 +378,7 @@ impl Conversion {
                 contacts,
                 state,
                 edge,
+                stage: of_protocol.and_then(|run| run.stage_end()),
             })?;
         }
         Ok(())
@@ -371,7 +386,7 @@ impl Conversion {
 
     /// Writes the metrics of a step that has no recorded frame.
     fn write_row(&mut self, step: u64, row: Row) -> Result<(), ConvertError> {
-        let metrics = row.whole(self.model);
+        let metrics = row.whole(&self.has);
         let metrics = metrics.filter(|_| self.channels.metrics.includes(step));
         if metrics.is_some() {
             self.writer.send(Snapshot {
@@ -383,6 +398,7 @@ impl Conversion {
                 contacts: false,
                 state: false,
                 edge: false,
+                stage: None,
             })?;
         }
         Ok(())
@@ -391,7 +407,7 @@ impl Conversion {
     /// Writes the metrics that are whole, where there are no states to wait for.
     fn write_whole_rows(&mut self) -> Result<(), ConvertError> {
         while let Some(entry) = self.waiting.first_entry()
-            && let Some(metrics) = entry.get().whole(self.model)
+            && let Some(metrics) = entry.get().whole(&self.has)
         {
             let (step, row) = entry.remove_entry();
             self.writer.send(Snapshot {
@@ -403,6 +419,7 @@ impl Conversion {
                 contacts: false,
                 state: false,
                 edge: false,
+                stage: None,
             })?;
         }
         Ok(())

@@ -41,7 +41,7 @@
 //! | [`models`] | [disks](models::disks); [droplets](models::droplet): kernel, contour, the matrix `A`, the complementarity problem |
 //! | [`minimize`] | FIRE, Newton's method |
 //! | [`analysis`] | energy, stress, coordination, rattlers, minimum or saddle |
-//! | [`protocol`] | the relaxation: the loop that yields frames |
+//! | [`protocol`] | the relaxation: the loop that yields frames; behind it the box is compressed, sheared, or φ_J is looked for |
 //! | [`numerics`] | a second thread for one run |
 //! | [`text`], [`budget`] | text from strangers; how much memory their files may take |
 #![cfg_attr(

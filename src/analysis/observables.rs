@@ -32,10 +32,14 @@ pub const METRICS: [&str; 14] = [
 /// The values of [`METRICS`]; none where a model has no such number.
 pub type Metrics = [Option<f64>; METRICS.len()];
 
-/// Which of the [`METRICS`] a model has.
+/// Which of the [`METRICS`] a model has, in a run whose box a protocol changes or in another.
 #[cfg(feature = "recording")]
-pub(crate) fn metrics_of(model: Kind) -> [bool; METRICS.len()] {
-    METRICS.map(|name| name != "moment" || model.balances_moments())
+pub(crate) fn metrics_of(model: Kind, is_strained: bool) -> [bool; METRICS.len()] {
+    METRICS.map(|name| match name {
+        "moment" => model.balances_moments(),
+        "phi" | "strain" | "stress_xx" | "stress_yy" => is_strained,
+        _ => true,
+    })
 }
 
 /// What a frame is worth in numbers, all in units of the line tension γ: they do not depend on its value.

@@ -465,6 +465,39 @@ pub struct Jamming {
     pub failed: u64,
 }
 
+/// What a stage of a protocol, or the relaxation in front of it, has come to at its last state.
+///
+/// ```
+/// use softjam::{protocol::{Relaxation, Status}, scene::Scene};
+///
+/// let scene = Scene::from_toml("particles = 32\nmodel = 'disks'\n[[protocol]]\nact = 'shear'\nstrain = 0.002").unwrap();
+/// let mut run = Relaxation::new(&scene).unwrap();
+/// while run.status() == Status::Running {
+///     run.advance().unwrap();
+/// }
+/// let end = run.stage_end().unwrap();
+/// assert_eq!((end.act, end.strain), ("shear", 0.002));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageEnd {
+    /// The stage, counted from 0, and what it does.
+    pub stage: u32,
+    /// Its word in scenes.
+    pub act: &'static str,
+    /// Coverage of the undeformed disks.
+    pub phi: f64,
+    /// Strain of all stages so far.
+    pub strain: f64,
+    /// Pressure (γ/length).
+    pub pressure: f64,
+    /// Stress `(σ_xx, σ_xy, σ_yy)`, tension positive (γ/length).
+    pub stress: [f64; 3],
+    /// Mean coordination of the particles that are held.
+    pub coordination: f64,
+    /// What a search of φ_J has found.
+    pub jamming: Option<Jamming>,
+}
+
 /// What a search of φ_J has come to at a relaxed packing under this pressure (γ/length); `None` of another act.
 pub(crate) fn jamming(
     act: Act,

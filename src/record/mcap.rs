@@ -7,6 +7,7 @@
 //! | `/world/vertices` | `foxglove.PointCloud` | their vertices, which the rerun viewer draws |
 //! | `/world/contacts` | `foxglove.SceneUpdate` | a segment a contact between the centres, width and colour by the force |
 //! | `/metrics` | `softjam.v1.Metrics` | the scalars of a step |
+//! | `/protocol` | `softjam.v1.Protocol` | what each finished stage of a protocol has come to |
 //! | `/state` | `softjam.v1.State` | lossless |
 //!
 //! The metadata record `softjam` (format version, program, digest of the scene, first step, legs if it was changed on its way) and the attachment `scene.toml`
@@ -17,8 +18,8 @@
 
 use super::images::seats;
 use super::messages::{
-    ABOUT, MetricsMessage, ParticlesMessage, RESULT, SCENE, STEP_NANOSECONDS, StateMessage,
-    descriptors, topic,
+    ABOUT, MetricsMessage, ParticlesMessage, ProtocolMessage, RESULT, SCENE, STEP_NANOSECONDS,
+    StateMessage, descriptors, topic,
 };
 use super::patience::Patience;
 use super::pictures::{Network, StageContours};
@@ -102,6 +103,7 @@ struct Topics {
     contacts: u16,
     metrics: u16,
     state: u16,
+    protocol: u16,
 }
 
 impl<W: Write> McapRecorder<W> {
@@ -143,8 +145,7 @@ impl<W: Write> McapRecorder<W> {
                 data: Cow::Owned(header.toml().into_bytes()),
             })
             .map_err(io_error)?;
-        let topics =
-            Topics::open(&mut writer, &header.scene.channels, header.format).map_err(io_error)?;
+        let topics = Topics::open(&mut writer, &header.scene, header.format).map_err(io_error)?;
         let particles = ParticlesMessage::of(header.packing.radii(), header.packing.domain());
         let mut recorder = Self {
             writer,
@@ -245,6 +246,10 @@ impl<W: Write> Recorder for McapRecorder<W> {
             let message = MetricsMessage::of(step, snapshot.nanoseconds, metrics);
             self.send(self.topics.metrics, step, &message)?;
         }
+        if let Some(end) = &snapshot.stage {
+            let message = ProtocolMessage::of(step, end);
+            self.send(self.topics.protocol, step, &message)?;
+        }
         if let Some(frame) = snapshot.frame.as_ref().filter(|_| snapshot.state) {
             let digest = frame.digest();
             self.digests.update(&digest);
@@ -307,12 +312,13 @@ impl<W: Write> Recorder for McapRecorder<W> {
 }
 
 impl Topics {
-    /// Names the topics that `channels` switch on; the others keep the number 0, which no message is sent under.
+    /// Names the topics that the channels of `scene` switch on; the others keep the number 0, which no message is sent under.
     fn open<W: Write + io::Seek>(
         writer: &mut mcap::Writer<W>,
-        channels: &crate::scene::Channels,
+        scene: &crate::scene::Scene,
         format: u32,
     ) -> Result<Self, McapError> {
+        let channels = &scene.channels;
         let mut open = |on: bool, topic: &str, schema: (&str, &str, &[u8])| {
             if !on {
                 return Ok(0);
@@ -340,6 +346,11 @@ impl Topics {
                 channels.state.is_on(),
                 topic::STATE,
                 own("softjam.v1.State"),
+            )?,
+            protocol: open(
+                !scene.protocol.is_empty(),
+                topic::PROTOCOL,
+                own("softjam.v1.Protocol"),
             )?,
         })
     }

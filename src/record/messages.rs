@@ -2,6 +2,7 @@
 
 use crate::analysis::Metrics;
 use crate::domain::{Domain, Vec2};
+use crate::protocol::StageEnd;
 use crate::state::Frame;
 
 /// The schemas of the messages below: a `FileDescriptorSet`, made by `proto/regenerate`.
@@ -128,6 +129,42 @@ impl MetricsMessage {
     }
 }
 
+/// `softjam.v1.Protocol`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(crate) struct ProtocolMessage {
+    #[prost(uint64, tag = "1")]
+    pub step: u64,
+    #[prost(string, tag = "2")]
+    pub act: String,
+    #[prost(double, optional, tag = "3")]
+    pub phi: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub strain: Option<f64>,
+    #[prost(double, optional, tag = "5")]
+    pub pressure: Option<f64>,
+    #[prost(double, repeated, tag = "6")]
+    pub stress: Vec<f64>,
+    #[prost(double, optional, tag = "7")]
+    pub coordination: Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub phi_j: Option<f64>,
+}
+
+impl ProtocolMessage {
+    pub fn of(step: u64, end: &StageEnd) -> Self {
+        Self {
+            step,
+            act: end.act.to_owned(),
+            phi: Some(end.phi),
+            strain: Some(end.strain),
+            pressure: Some(end.pressure),
+            stress: end.stress.to_vec(),
+            coordination: Some(end.coordination),
+            phi_j: end.jamming.map(|jamming| jamming.phi_j),
+        }
+    }
+}
+
 /// `softjam.v1.State`.
 #[derive(Clone, PartialEq, prost::Message)]
 pub(crate) struct StateMessage {
@@ -188,6 +225,7 @@ pub(crate) mod topic {
     pub const VERTICES: &str = "/world/vertices";
     pub const CONTACTS: &str = "/world/contacts";
     pub const METRICS: &str = "/metrics";
+    pub const PROTOCOL: &str = "/protocol";
     pub const STATE: &str = "/state";
 }
 

@@ -11,6 +11,7 @@ use super::{Header, Snapshot};
 use crate::analysis::Metrics;
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Domain;
+use crate::protocol::StageEnd;
 use crate::state::Frame;
 use crate::state::Packing;
 
@@ -46,6 +47,8 @@ pub(super) struct Rows {
 #[derive(Default)]
 pub(super) struct Batch {
     pub metrics: Vec<MetricRow>,
+    /// Step, simulated time in nanoseconds and end of each finished stage of a protocol.
+    pub stages: Vec<(u64, i64, StageEnd)>,
     /// Step, simulated time in nanoseconds and box, where it changes.
     pub boxes: Vec<(u64, i64, Domain)>,
     pub contours: StripRows,
@@ -96,6 +99,8 @@ impl Rows {
                 .push((snapshot.step, nanoseconds, metrics));
             self.pending.bytes += METRICS_BYTES;
         }
+        let at = |end| (snapshot.step, nanoseconds, end);
+        self.pending.stages.extend(snapshot.stage.map(at));
         if let Some(frame) = &snapshot.frame {
             self.record_frame(snapshot, frame);
         }

@@ -12,8 +12,9 @@
 //! | `/world/contacts` | a segment a contact between the centres, width and colour by the force; `softjam.Contact:pair`, `:force` (γ), `:overlap` (`δ_ij`, length) |
 //! | `/world/contacts/images` | those that cross an edge, at its other side; `softjam.Image:contact` is the contact |
 //! | `/metrics/*` | one scalar each |
+//! | `/protocol` | what each finished stage of a protocol has come to: `softjam.Protocol:act`, `:phi`, `:strain`, `:pressure`, `:stress`, `:coordination`, `:phi_j` |
 //! | `/particles` | `softjam.Particles:radius`, `:box` (the sides) |
-//! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless |
+//! | `/state` | `softjam.State:position`, `:velocity`, `:contact`, `:force`, `:minimizer`, `:digest`, lossless; `:memory`, `:box`, `:stage`, `:protocol` where a run has them |
 //! | `/result` | `softjam.Result:converged`, `:steps`, `:f_max`, `:digest`; its absence means an unfinished run |
 //!
 //! Images, points and disks belong to the channel of the contours or contacts that they stand beside, which are instance by
@@ -31,13 +32,14 @@ use super::rows::{Batch, MetricRow, Rows};
 use super::{Header, Outcome, Recorder, Snapshot, Written, blueprint, header, id_of, legs_to_text};
 use crate::analysis::METRICS;
 use crate::domain::Domain;
+use crate::protocol::StageEnd;
 use rerun::external::arrow::array::{
     BooleanArray, Float64Array, StringArray, UInt8Array, UInt64Array,
 };
 use rerun::external::arrow::buffer::OffsetBuffer;
 use rerun::external::re_log_types::StoreId;
 use rerun::log::{Chunk, RowId};
-use rerun::{DynamicArchetype, Scalars, TimeColumn, TimePoint};
+use rerun::{DynamicArchetype, Scalars, TimeColumn, TimePoint, Timeline};
 use std::io::{self, Write};
 
 /// Writes snapshots as an `.rrd` stream.
@@ -144,6 +146,7 @@ impl<W: Write> Chunks<W> {
         self.write_contacts(batch.contacts, batch.contact_images, batch.contact_numbers)?;
         self.write_metrics(&batch.metrics)?;
         self.write_boxes(&batch.boxes)?;
+        self.write_stages(&batch.stages)?;
         let times = batch.states.times.clone();
         self.write_columns("/state", &times, batch.states.into_columns()?)?;
         self.intact = batch.last.or(self.intact);
@@ -225,6 +228,29 @@ impl<W: Write> Chunks<W> {
             let column = lists(each, array(values));
             let columns = vec![(Scalars::descriptor_scalars(), column)];
             self.write_columns(&format!("/metrics/{name}"), &times, columns)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what finished stages have come to.
+    fn write_stages(&mut self, stages: &[(u64, i64, StageEnd)]) -> io::Result<()> {
+        for (step, nanoseconds, end) in stages {
+            let number = |x: f64| array(Float64Array::from(vec![x]));
+            let act = array(StringArray::from(vec![end.act]));
+            let mut row = DynamicArchetype::new("softjam.Protocol")
+                .with_component_from_data("act", act)
+                .with_component_from_data("phi", number(end.phi))
+                .with_component_from_data("strain", number(end.strain))
+                .with_component_from_data("pressure", number(end.pressure))
+                .with_component_from_data("coordination", number(end.coordination))
+                .with_component_from_data("stress", array(Float64Array::from(end.stress.to_vec())));
+            if let Some(jamming) = end.jamming {
+                row = row.with_component_from_data("phi_j", number(jamming.phi_j));
+            }
+            let time = TimePoint::default()
+                .with(Timeline::new_sequence("step"), *step as i64)
+                .with(Timeline::new_duration("sim_time"), *nanoseconds);
+            self.encoder.single(&self.store, "/protocol", time, &row)?;
         }
         Ok(())
     }

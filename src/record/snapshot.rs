@@ -1,7 +1,7 @@
 //! What is recorded of a step, and how snapshots are taken of a run.
 
 use crate::analysis::{Backbone, Metrics};
-use crate::protocol::Relaxation;
+use crate::protocol::{Relaxation, StageEnd};
 use crate::scene::Channels;
 use crate::state::Frame;
 use std::collections::VecDeque;
@@ -37,8 +37,11 @@ pub struct Snapshot {
     pub contacts: bool,
     /// Whether the state is recorded.
     pub state: bool,
-    /// Whether it is the first or the last step of the recording, or the first of a stage, of which every picture is drawn.
+    /// Whether it is the first or the last step of the recording, the first of a stage or a relaxed state of a protocol, of which every
+    /// picture is drawn.
     pub edge: bool,
+    /// What a stage of a protocol has come to, whose last frame this is.
+    pub stage: Option<StageEnd>,
 }
 
 impl Snapshot {
@@ -80,6 +83,7 @@ impl Snapshot {
             contacts,
             state,
             edge,
+            stage: run.stage_end(),
         })
     }
 }

@@ -78,12 +78,17 @@ pub struct Balance {
     pub pull: Worst,
     /// The largest relative difference between recorded energy, pressure and those of the recorded forces.
     pub energy_and_pressure: Worst,
+    /// The largest of `f_max` and moment of the states between which a protocol strains the box (units of γ), as far above what their stage is
+    /// relaxed to as one is.
+    pub relaxed: Worst,
     /// Frames seen.
     pub frames: u64,
     /// The step of the last frame, and its `f_max` from positions alone (units of γ).
     pub last: Option<(u64, f64)>,
     /// The largest moment of a contact in the last frame (γ·length).
     last_moment: f64,
+    /// The strain step of the last frame, where there is a protocol.
+    strain_step: Option<(u32, u64)>,
 }
 
 /// How far a residual may always be from zero: round-off, and the full tolerance amplified by a matrix of condition 6.
@@ -106,9 +111,11 @@ impl Balance {
             overlap: Worst::default(),
             pull: Worst::default(),
             energy_and_pressure: Worst::default(),
+            relaxed: Worst::default(),
             frames: 0,
             last: None,
             last_moment: 0.0,
+            strain_step: None,
         }
     }
 
@@ -119,6 +126,7 @@ impl Balance {
     /// If frame and packing do not belong together; a [`Recording`](super::Recording) gives only such that do.
     pub fn check(&mut self, packing: &Packing, frame: &Frame, metrics: &[(&'static str, f64)]) {
         let step = frame.step;
+        self.leave_state(frame);
         let scene = self.scene.stage(frame.stage);
         if frame.stage != self.stage.0 {
             self.stage = (frame.stage, scene.model());
@@ -152,6 +160,26 @@ impl Balance {
         }
     }
 
+    /// The frame before was the last of its strain step, and relaxed, if this one is of another.
+    fn leave_state(&mut self, frame: &Frame) {
+        let is_of_disks = frame.stage == 0 && self.scene.records_disks();
+        if self.scene.protocol.is_empty() || is_of_disks {
+            return;
+        }
+        let step = (
+            frame.stage,
+            frame.protocol.get(1).map_or(0, |count| *count as u64),
+        );
+        if let (Some((last, f_max)), Some(before)) = (self.last, self.strain_step)
+            && before != step
+        {
+            let threshold = self.scene.stage(before.0).threshold;
+            self.relaxed
+                .of(f_max.max(self.last_moment), threshold, last);
+        }
+        self.strain_step = Some(step);
+    }
+
     /// Whether all frames seen fulfil the contact law to the tolerance that is due in them. With Saitoh's rule contacts lag behind their
     /// positions by a step, so only the last frame is asked for: its step must not be among the worst.
     #[must_use]
@@ -164,6 +192,7 @@ impl Balance {
             && within(&self.overlap)
             && within(&self.pull)
             && within(&self.energy_and_pressure)
+            && self.relaxed.agrees()
     }
 
     /// Whether the last frame bears out a result: a converged run ends with `f_max` and moments not above its threshold. The recorded `f_max` may be
@@ -181,13 +210,13 @@ impl Balance {
     /// ```
     #[must_use]
     pub fn bears_out(&self, outcome: &Outcome, tolerance: f64) -> bool {
+        let threshold = self.scene.stage(self.stage.0).threshold;
         self.last.is_some_and(|(step, f_max)| {
             step == outcome.steps
                 && (f_max.to_bits() == outcome.f_max.to_bits()
                     || (f_max - outcome.f_max).abs() <= tolerance)
                 && outcome.converged
-                    == (outcome.f_max <= self.scene.threshold
-                        && self.last_moment <= self.scene.threshold)
+                    == (outcome.f_max <= threshold && self.last_moment <= threshold)
         })
     }
 }

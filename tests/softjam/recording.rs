@@ -205,6 +205,7 @@ fn rare_metrics_reach_the_file_while_the_run_goes_on() {
                 contacts: false,
                 state: false,
                 edge: false,
+                stage: None,
             };
             writer.send(snapshot).expect("room");
         };

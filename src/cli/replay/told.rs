@@ -215,6 +215,12 @@ pub(super) fn tell_balance(b: &Balance, model: Kind, lines: &mut Lines) {
         "observables",
         format!("energy and pressure, relative: {observables}"),
     );
+    if b.relaxed.value > 0.0 {
+        lines.line(
+            "states",
+            format!("f_max of relaxed states: {}", at(&b.relaxed)),
+        );
+    }
     if b.pull.value > 0.0 {
         lines.line("pulls", at(&b.pull));
     }

@@ -205,6 +205,7 @@ impl Findings {
                 "overlap": worst(&b.overlap),
                 "pull": worst(&b.pull),
                 "energy_and_pressure": worst(&b.energy_and_pressure),
+                "relaxed": worst(&b.relaxed),
                 "f_max": b.last.map(|l| l.1),
             })
         });

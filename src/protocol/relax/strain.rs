@@ -1,6 +1,6 @@
 //! The stages of a protocol: the box is strained between relaxed states.
 
-use super::super::drive::{self, Jamming, Next, Progress};
+use super::super::drive::{self, Jamming, Next, Progress, StageEnd};
 use super::{RelaxError, Relaxation, finishes};
 use crate::domain::Vec2;
 use crate::minimize::Mover;
@@ -46,6 +46,30 @@ impl Relaxation {
             drive::jamming(stage.act, &self.progress, &self.packing, pressure)
         };
         self.is_balanced().then(found)?
+    }
+
+    /// What a stage has come to in a run with a protocol, if this frame is its last; `None` otherwise.
+    #[must_use]
+    pub fn stage_end(&self) -> Option<StageEnd> {
+        if !self.is_relaxed_state() || self.is_on_saddle() {
+            return None;
+        }
+        let next = self.next_of_protocol();
+        if next.is_some_and(|(stage, _)| stage == self.stage) {
+            return None;
+        }
+        let o = self.observables();
+        let stage = self.scene.stage_of_protocol(self.stage);
+        Some(StageEnd {
+            stage: self.stage,
+            act: stage.map_or("relax", |stage| stage.act.name()),
+            phi: self.packing.coverage(),
+            strain: self.progress.strain,
+            pressure: o.pressure(),
+            stress: o.stress,
+            coordination: o.coordination(),
+            jamming: self.jamming(),
+        })
     }
 
     /// Goes over to a later stage, whose states are relaxed further, with the present packing.
