@@ -18,13 +18,14 @@
 //! C_ii = Γ (1 + s)²/S,   C_ij = −Γ (1 − s²)/S,   C_jj = Γ (1 − s)²/S,       Γ = −f³ (4 − 2 h cot δ) / 16 cos δ
 //! ```
 //!
-//! They were derived for this program, and are tested against numbers of 40 digits.
+//! They were derived for this program, and are tested against numbers of 40 digits. All come from `cos δ` and `a = (δ/sin δ − 1)/sin² δ`, which are
+//! found for all films of a packing at once: `δ/sin δ − 1 = a z²`, `1 − cos δ = z²/(1 + cos δ)` and `h = 2z (a + 1/(1 + cos δ))` for `z = sin δ`.
 
 /// The sine of `δ` beyond which there is no film.
 const STEEPEST: f64 = 0.95;
 
-/// Below this `sin² δ` the functions of `δ` are taken from their series; what is left out is below 1e-16.
-const FLAT: f64 = 1e-3;
+/// Up to this sine `a` is a quotient of polynomials in `z²`, that of fdlibm's `asin`, whose error is below 2e-18.
+const QUOTIENT: f64 = 0.5;
 
 /// A film, by its force (units of γ) and the corner radii of its two droplets (length).
 #[derive(Clone, Copy, Debug)]
@@ -35,67 +36,57 @@ pub(super) struct Film {
     sum: f64,
     /// `s`, seen from the first droplet.
     slope: f64,
-    /// `cos δ` and `tan δ`.
+    /// `cos δ` and `a`.
     cos: f64,
-    tan: f64,
-    /// `δ/sin δ − 1`.
-    longer: f64,
-    /// `½(δ/sin δ + cos δ) − 1`.
-    energy: f64,
-    /// `h` and `h cot δ`.
-    h: f64,
-    h_cot: f64,
+    arc: f64,
+}
+
+/// `cos δ` and `a` of a film whose sine is no larger than [`QUOTIENT`].
+#[inline(always)]
+fn bend(z: f64) -> (f64, f64) {
+    const P: [f64; 6] = [
+        1.666_666_666_666_666_574_15e-1,
+        -3.255_658_186_224_009_154_05e-1,
+        2.012_125_321_348_629_258_81e-1,
+        -4.005_553_450_067_941_140_27e-2,
+        7.915_349_942_898_145_321_76e-4,
+        3.479_331_075_960_211_675_70e-5,
+    ];
+    const Q: [f64; 5] = [
+        1.0,
+        -2.403_394_911_734_414_218_78,
+        2.020_945_760_233_505_694_71,
+        -6.882_839_716_054_532_930_30e-1,
+        7.703_815_055_590_193_527_91e-2,
+    ];
+    let z2 = z * z;
+    let mut p = P[5];
+    for k in (0..5).rev() {
+        p = P[k] + z2 * p;
+    }
+    let mut q = Q[4];
+    for k in (0..4).rev() {
+        q = Q[k] + z2 * q;
+    }
+    ((1.0 - z2).sqrt(), p / q)
+}
+
+/// `a` of any film.
+fn arc(z: f64) -> f64 {
+    if z.abs() <= QUOTIENT {
+        bend(z).1
+    } else {
+        (libm::asin(z) / z - 1.0) / (z * z)
+    }
 }
 
 impl Film {
     /// The film between droplets of corner radii `[r_i, r_j]`, which bears `force`; `None` if that bends it too far.
-    pub fn of(force: f64, [r_i, r_j]: [f64; 2]) -> Option<Self> {
-        let sum = r_i + r_j;
-        let slope = (r_j - r_i) / sum;
-        let z = 0.5 * slope * force;
-        if z.is_nan() || z.abs() >= STEEPEST {
-            return None;
-        }
-        let z2 = z * z;
-        let cos = (1.0 - z2).sqrt();
-        let (longer, energy, h, h_cot);
-        if z2 < FLAT {
-            // asin z = z + z³/6 + 3z⁵/40 + 15z⁷/336 + 105z⁹/3456 + …, cos δ = 1 − z²/2 − z⁴/8 − z⁶/16 − 5z⁸/128 − …
-            let arc = [
-                1.0 / 6.0,
-                3.0 / 40.0,
-                15.0 / 336.0,
-                105.0 / 3456.0,
-                945.0 / 42240.0,
-            ];
-            let fall = [1.0 / 2.0, 1.0 / 8.0, 1.0 / 16.0, 5.0 / 128.0, 7.0 / 256.0];
-            let series = |a: f64| {
-                let terms = arc.iter().zip(&fall).rev();
-                terms.fold(0.0, |sum, (arc, fall)| sum * z2 + (arc + a * fall))
-            };
-            longer = z2 * series(0.0);
-            energy = 0.5 * z2 * series(-1.0);
-            // 2δ − sin 2δ = 2 z (δ/sin δ − cos δ).
-            h = 2.0 * z * series(1.0);
-            h_cot = 2.0 * series(1.0) * cos;
-        } else {
-            let ratio = libm::asin(z) / z;
-            longer = ratio - 1.0;
-            energy = 0.5 * (ratio + cos) - 1.0;
-            h = 2.0 * (ratio - cos) / z;
-            h_cot = h * cos / z;
-        }
-        Some(Self {
-            force,
-            sum,
-            slope,
-            cos,
-            tan: z / cos,
-            longer,
-            energy,
-            h,
-            h_cot,
-        })
+    #[cfg(test)]
+    pub fn of(force: f64, corners: [f64; 2]) -> Option<Self> {
+        let mut arcs = Arcs::default();
+        let found = arcs.find(&[force], &corners, &[[0, 1]]);
+        found.then(|| arcs.film(0, force))
     }
 
     /// A straight film, whatever it bears: nothing is added.
@@ -104,58 +95,172 @@ impl Film {
         sum: 1.0,
         slope: 0.0,
         cos: 1.0,
-        tan: 0.0,
-        longer: 0.0,
-        energy: 0.0,
-        h: 0.0,
-        h_cot: 0.0,
+        arc: 0.0,
     };
 
+    /// `sin δ`.
+    #[inline(always)]
+    fn sin(&self) -> f64 {
+        0.5 * self.slope * self.force
+    }
+
     /// `C` (force·length).
+    #[inline(always)]
     pub fn energy(&self) -> f64 {
-        self.sum * self.force * self.energy
+        let square = self.sin() * self.sin();
+        0.5 * self.sum * self.force * (self.arc * square - self.fall())
     }
 
     /// `cos δ`: a chord is so much of a corner radius farther from the centre, `C_f = −(r_i + r_j)(1 − cos δ)`.
+    #[inline(always)]
     pub fn cos(&self) -> f64 {
         self.cos
     }
 
     /// `1 − cos δ`.
+    #[inline(always)]
     pub fn fall(&self) -> f64 {
-        let sin = self.tan * self.cos;
-        sin * sin / (1.0 + self.cos)
+        self.sin() * self.sin() / (1.0 + self.cos)
+    }
+
+    /// `r_i + r_j` (length).
+    #[inline(always)]
+    pub fn sum(&self) -> f64 {
+        self.sum
     }
 
     /// `δ` and `−δ`: how the film is bent seen from its first droplet, and from its second (radians).
     pub fn bend(&self) -> [f64; 2] {
-        let bend = libm::asin(self.tan * self.cos);
+        let bend = libm::asin(self.sin());
         [bend, -bend]
     }
 
+    /// `h/2 sin δ`.
+    #[inline(always)]
+    fn half_h(&self) -> f64 {
+        self.arc + 1.0 / (1.0 + self.cos)
+    }
+
     /// `ψ_i` and `ψ_j` (force).
+    #[inline(always)]
     pub fn psi(&self) -> [f64; 2] {
-        let even = self.force * self.longer;
-        let odd = self.force * self.force * self.h / 8.0;
+        let z = self.sin();
+        let even = self.force * self.arc * (z * z);
+        let odd = 0.25 * self.force * self.force * z * self.half_h();
         [even + odd, even - odd]
     }
 
     /// `−C_ff` (length/force), not negative.
+    #[inline(always)]
     pub fn softness(&self) -> f64 {
         self.sum * self.slope * self.slope * self.force / (4.0 * self.cos)
     }
 
     /// `½ f (1 + s) tan δ` of the first droplet, `−½ f (1 − s) tan δ` of the second: what `C_f,r` has beside `cos δ − 1`.
+    #[inline(always)]
     pub fn tilt(&self) -> [f64; 2] {
-        let half = 0.5 * self.force * self.tan;
+        let half = 0.5 * self.force * self.sin() / self.cos;
         [half * (1.0 + self.slope), -half * (1.0 - self.slope)]
     }
 
     /// `[C_ii, C_ij, C_jj]` (force/length).
+    #[inline(always)]
     pub fn second(&self) -> [f64; 3] {
         let cube = self.force * self.force * self.force;
-        let gamma = -cube * (4.0 - 2.0 * self.h_cot) / (16.0 * self.cos) / self.sum;
+        let gamma =
+            cube * (self.half_h() * self.cos - 1.0) / (4.0 * (self.cos * self.sum));
         let (p, m) = (1.0 + self.slope, 1.0 - self.slope);
         [gamma * p * p, -gamma * p * m, gamma * m * m]
     }
+}
+
+/// The films of a packing, one a line.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Arcs {
+    sums: Vec<f64>,
+    slopes: Vec<f64>,
+    cosines: Vec<f64>,
+    arcs: Vec<f64>,
+}
+
+impl Arcs {
+    /// The films between the droplets of `pairs` of such corner radii (length) under `loads` (units of γ); `false` if one is bent too far.
+    #[inline(always)]
+    pub fn find(&mut self, loads: &[f64], corners: &[f64], pairs: &[[u32; 2]]) -> bool {
+        for column in [
+            &mut self.sums,
+            &mut self.slopes,
+            &mut self.cosines,
+            &mut self.arcs,
+        ] {
+            column.resize(loads.len(), 0.0);
+        }
+        let columns = self.sums.iter_mut().zip(&mut self.slopes);
+        for ((sum, slope), pair) in columns.zip(pairs) {
+            let [i, j] = pair.map(|p| corners[p as usize]);
+            (*sum, *slope) = (i + j, j - i);
+        }
+        quotients(&mut self.slopes, &self.sums);
+        bends(loads, &self.slopes, &mut self.cosines, &mut self.arcs);
+        let steepest = steepest(loads, &self.slopes);
+        if steepest > QUOTIENT {
+            for ((arc, slope), f) in self.arcs.iter_mut().zip(&self.slopes).zip(loads) {
+                *arc = self::arc(0.5 * slope * f);
+            }
+        }
+        steepest < STEEPEST
+    }
+
+    /// That of a line, which bears `force` (units of γ).
+    #[inline(always)]
+    pub fn film(&self, line: usize, force: f64) -> Film {
+        Film {
+            force,
+            sum: self.sums[line],
+            slope: self.slopes[line],
+            cos: self.cosines[line],
+            arc: self.arcs[line],
+        }
+    }
+}
+
+#[inline(always)]
+fn quotients(a: &mut [f64], b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a /= b;
+    }
+}
+
+#[inline(always)]
+fn bends(loads: &[f64], slopes: &[f64], cosines: &mut [f64], arcs: &mut [f64]) {
+    let films = loads.iter().zip(slopes);
+    for ((f, s), (cos, arc)) in films.zip(cosines.iter_mut().zip(arcs)) {
+        (*cos, *arc) = bend(0.5 * s * f);
+    }
+}
+
+/// The largest `|sin δ|`, infinite if one is no number.
+#[inline(always)]
+fn steepest(loads: &[f64], slopes: &[f64]) -> f64 {
+    let (loads, last_loads) = loads.as_chunks::<8>();
+    let (slopes, last_slopes) = slopes.as_chunks::<8>();
+    // A NaN hides behind comparisons, not behind a sum.
+    let (mut most, mut sums) = ([0.0; 8], [0.0; 8]);
+    for (f, s) in loads.iter().zip(slopes) {
+        for k in 0..8 {
+            let z = (0.5 * s[k] * f[k]).abs();
+            most[k] = if z > most[k] { z } else { most[k] };
+            sums[k] += z;
+        }
+    }
+    for (k, (f, s)) in last_loads.iter().zip(last_slopes).enumerate() {
+        let z = (0.5 * s * f).abs();
+        most[k] = if z > most[k] { z } else { most[k] };
+        sums[k] += z;
+    }
+    let sum: f64 = sums.iter().sum();
+    if sum.is_nan() {
+        return f64::INFINITY;
+    }
+    most.into_iter().fold(0.0, f64::max)
 }

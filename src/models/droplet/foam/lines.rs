@@ -1,8 +1,7 @@
 //! The lines along which droplets may press on each other, and what each droplet's lines have to do with each other.
 //!
 //! Every pair of droplets that are near enough has a line: the vector `Δx = x_j − x_i` to the nearest image, turned by the tilt `τ` of the
-//! pair, gives the unit normal `n` of their contact, outward from `i`. A line is a *side* of each of its two droplets; sides of a droplet are
-//! numbered in the order of the pairs. Of each droplet the kernel between its sides is kept,
+//! pair, gives the unit normal `n` of their contact, outward from `i`. Of each droplet the kernel between its [sides](Sides) is kept,
 //!
 //! ```text
 //! Â_kl = −g(θ_k − θ_l)/2π,   Â_kk = 3/4π,        G_kl = g'(θ_k − θ_l)/2π,   G_kk = 0
@@ -10,171 +9,191 @@
 //!
 //! which is the matrix of Morse and Witten for a droplet of radius 1, and its slope.
 //!
-//! Invariants: `pairs` ascend; `sides[first[p]..first[p + 1]]` are those of droplet `p`, and block `p` is the square of their number.
+//! Invariants: `pairs` ascend; columns by lines are as long as they are. What stands at empty places beside the sides of a droplet is finite.
 
+use super::sides::{LANES, Lanes, Side, Sides};
+use super::tilts::half_turn;
 use crate::domain::Vec2;
-use crate::models::droplet::kernel::Direction;
+use crate::models::droplet::kernel::{Angles, Direction};
 use crate::numerics::wide::wide;
-use crate::state::{Packing, unit_and_length};
+use crate::state::Packing;
 use core::f64::consts::PI;
 
 /// A line is kept for droplets whose centres are no farther apart than this (sums of their radii). Contacts reach 1.15 in balance at φ = 0.995, and
 /// 1.225 on the way from disks at 0.99.
 pub(super) const REACH: f64 = 1.3;
 
-/// A side of a droplet: which line it is, and whether the droplet is the second of its pair.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Side {
-    pub line: u32,
-    pub is_second: bool,
-}
-
 /// See the [module](self).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lines {
     pairs: Vec<[u32; 2]>,
-    /// `Δx/|Δx|` and `|Δx|` (length).
-    along: Vec<Vec2>,
+    /// `Δx/|Δx|`, its components, and `|Δx|` (length).
+    along: [Vec<f64>; 2],
     distances: Vec<f64>,
     /// `δ = R_i + R_j − |Δx|` (length).
     overlaps: Vec<f64>,
     /// `|Δx| − n·Δx = 2|Δx| sin²(τ/2)`, and `|Δx| sin τ` (length).
-    turned: Vec<[f64; 2]>,
-    /// `n`, outward from the first droplet.
+    shorter: Vec<f64>,
+    across: Vec<f64>,
+    /// `n`, outward from the first droplet, its components, and its angle (radians).
     normals: Vec<Vec2>,
-    first: Vec<u32>,
-    sides: Vec<Side>,
-    /// The side that a line is of its first and its second droplet.
-    sides_of: Vec<[u32; 2]>,
-    /// Where the blocks of droplets begin in `kernel` and `slopes`.
-    blocks: Vec<u32>,
-    kernel: Vec<f64>,
-    slopes: Vec<f64>,
-    /// `n` with its angle.
-    directions: Vec<Direction>,
-}
-
-/// `−g(θ)/2π` and `g'(θ)/2π` of the angle `θ` from `b` to `a`: `g = (π − |θ|) sin |θ| − ½ cos θ − 1`.
-#[inline(always)]
-fn between(a: Direction, b: Direction) -> (f64, f64) {
-    const PER_TURN: f64 = 1.0 / (2.0 * PI);
-    let difference = a.angle - b.angle; // in [−2π, 2π]
-    let sin = a.sin * b.cos - a.cos * b.sin;
-    let cos = a.cos * b.cos + a.sin * b.sin;
-    // sign(θ) (π − |θ|)
-    let rest = PI.copysign(difference) - difference;
-    let kernel = (1.0 - rest * sin) + 0.5 * cos;
-    (PER_TURN * kernel, PER_TURN * (rest * cos - 0.5 * sin))
+    turned: [Vec<f64>; 2],
+    angles: Vec<f64>,
+    sides: Sides,
+    /// The outward directions by sides: components and angle.
+    outward: [Vec<Lanes>; 3],
+    kernel: Vec<Lanes>,
+    slopes: Vec<Lanes>,
+    /// Room for pairs and the sums of their radii, for the making of angles, and for a column.
+    next: Vec<[u32; 2]>,
+    sums: Vec<f64>,
+    nodes: Vec<[f64; 2]>,
+    known: Vec<f64>,
 }
 
 impl Lines {
-    /// The lines of `packing` among `near`, which holds all pairs that are near enough and ascends.
-    pub fn set(&mut self, packing: &Packing, near: &[[u32; 2]]) {
-        let (radii, positions) = (packing.radii(), packing.positions());
-        let domain = packing.domain();
-        self.pairs.clear();
-        self.along.clear();
-        self.distances.clear();
-        self.overlaps.clear();
-        for &[i, j] in near {
-            let [p, q] = [i as usize, j as usize];
-            let between = domain.minimum_image(positions[q] - positions[p]);
-            let reach = REACH * (radii[p] + radii[q]);
-            if between.norm_squared() < reach * reach {
-                let (along, distance) = unit_and_length(between);
-                self.pairs.push([i, j]);
-                self.along.push(along);
-                self.distances.push(distance);
-                self.overlaps.push(radii[p] + radii[q] - distance);
+    /// The lines of `packing` among `near`, which holds all pairs that are near enough and ascends. What is `known` of a pair stays with it; of
+    /// another nothing is known, 0.
+    pub fn set(&mut self, packing: &Packing, near: &[[u32; 2]], known: [&mut Vec<f64>; 2]) {
+        let count = wide(
+            #[inline(always)]
+            || self.find(packing, near),
+        );
+        self.next.truncate(count);
+        if self.next != self.pairs || self.sides.droplets() != packing.len() {
+            core::mem::swap(&mut self.pairs, &mut self.next);
+            for column in known {
+                carry((&self.next, &self.pairs), column, &mut self.known);
             }
+            self.sides.number(packing.len(), &self.pairs);
         }
-        self.number_sides(packing.len());
+        for column in self.along.iter_mut().chain([
+            &mut self.sums,
+            &mut self.distances,
+            &mut self.overlaps,
+        ]) {
+            column.resize(count, 0.0);
+        }
+        let [x, y] = &mut self.along;
+        wide(
+            #[inline(always)]
+            || {
+                lengths((x, y), &mut self.distances);
+                unit(x, &self.distances, 1.0);
+                unit(y, &self.distances, 0.0);
+                less(&self.sums, &self.distances, &mut self.overlaps);
+            },
+        );
     }
 
-    fn number_sides(&mut self, droplets: usize) {
-        self.first.clear();
-        self.first.resize(droplets + 1, 0);
-        for p in self.pairs.as_flattened() {
-            self.first[*p as usize + 1] += 1;
+    /// Which pairs are near enough, with `Δx` and the sums of their radii; how many there are.
+    #[inline(always)]
+    fn find(&mut self, packing: &Packing, near: &[[u32; 2]]) -> usize {
+        let (radii, positions) = (packing.radii(), packing.positions());
+        let [x, y] = &mut self.along;
+        for column in [&mut *x, &mut *y, &mut self.sums] {
+            column.resize(near.len(), 0.0);
         }
-        for p in 0..droplets {
-            self.first[p + 1] += self.first[p];
+        self.next.resize(near.len(), [0; 2]);
+        let (x, y) = (&mut x[..near.len()], &mut y[..near.len()]);
+        let (sums, next) = (&mut self.sums[..near.len()], &mut self.next[..near.len()]);
+        for (c, [i, j]) in near.iter().map(|pair| pair.map(|p| p as usize)).enumerate() {
+            let between = positions[j] - positions[i];
+            (x[c], y[c], sums[c]) = (between.x, between.y, radii[i] + radii[j]);
         }
-        let none = Side {
-            line: u32::MAX,
-            is_second: false,
-        };
-        self.sides.clear();
-        self.sides.resize(2 * self.pairs.len(), none);
-        self.sides_of.clear();
-        let mut next = self.first.clone();
-        for (line, &[i, j]) in (0..).zip(&self.pairs) {
-            let of = [(i, false), (j, true)].map(|(p, is_second)| {
-                let side = next[p as usize];
-                next[p as usize] += 1;
-                self.sides[side as usize] = Side { line, is_second };
-                side
-            });
-            self.sides_of.push(of);
+        packing.domain().fold_columns(x, y);
+        // Without a branch: nobody could guess who is near.
+        let mut count = 0;
+        for (c, pair) in near.iter().enumerate() {
+            let (dx, dy, sum) = (x[c], y[c], sums[c]);
+            (x[count], y[count], sums[count], next[count]) = (dx, dy, sum, *pair);
+            let reach = REACH * sum;
+            count += usize::from(dx * dx + dy * dy < reach * reach);
         }
-        self.blocks.clear();
-        let mut block = 0;
-        for p in 0..droplets {
-            self.blocks.push(block);
-            let sides = self.first[p + 1] - self.first[p];
-            block += sides * sides;
-        }
-        self.kernel.resize(block as usize, 0.0);
-        self.slopes.resize(block as usize, 0.0);
+        count
     }
 
     /// Turns each line by its tilt.
     pub fn turn(&mut self, tilts: &[f64]) {
-        self.turned.clear();
-        self.turned
-            .extend(self.distances.iter().zip(tilts).map(|(distance, tilt)| {
-                let (sin, cos) = libm::sincos(0.5 * tilt);
-                [2.0 * distance * sin * sin, 2.0 * distance * sin * cos]
-            }));
-        self.normals.clear();
-        self.normals
-            .extend(self.along.iter().zip(tilts).map(|(e, &tilt)| {
-                let (sin, cos) = libm::sincos(tilt);
-                let turned = Vec2::new(e.x * cos - e.y * sin, e.x * sin + e.y * cos);
-                // A unit vector to the last bit that it can be: angles are told from it.
-                unit_and_length(turned).0
-            }));
-        self.directions.clear();
-        let directions = self.normals.iter().map(|n| Direction::of(*n));
-        self.directions.extend(directions);
-        let sides = core::mem::take(&mut self.sides);
+        let count = self.len();
+        for column in self.turned.iter_mut().chain([
+            &mut self.shorter,
+            &mut self.across,
+            &mut self.angles,
+        ]) {
+            column.resize(count, 0.0);
+        }
+        for block in [&mut self.kernel, &mut self.slopes] {
+            block.resize(self.sides.rows(), [0.0; LANES]);
+        }
+        self.normals.resize(count, Vec2::zeros());
         wide(
             #[inline(always)]
-            || self.fill_blocks(&sides),
+            || {
+                let [x, y] = &mut self.turned;
+                lean(&self.distances, tilts, &mut self.shorter, &mut self.across);
+                rotate(&self.along, tilts, x, y);
+                Angles::new().of_columns((x, y), &mut self.nodes, &mut self.angles);
+                for ((n, x), y) in self.normals.iter_mut().zip(&*x).zip(&*y) {
+                    *n = Vec2::new(*x, *y);
+                }
+                let seen = |c: usize| {
+                    let first = Direction {
+                        cos: x[c],
+                        sin: y[c],
+                        angle: self.angles[c],
+                    };
+                    [first, first.opposite()]
+                };
+                let [cos, sin, angle] = &mut self.outward;
+                let lines = 0..count;
+                self.sides
+                    .scatter(cos, lines.clone().map(|c| seen(c).map(|d| d.cos)));
+                self.sides
+                    .scatter(sin, lines.clone().map(|c| seen(c).map(|d| d.sin)));
+                self.sides
+                    .scatter(angle, lines.map(|c| seen(c).map(|d| d.angle)));
+                self.fill_blocks();
+            },
         );
-        self.sides = sides;
     }
 
-    /// `Â` and `G` of all droplets: each pair of sides once, since the first is even and the second odd.
+    /// `Â` and `G` of all droplets, row by row.
     #[inline(always)]
-    fn fill_blocks(&mut self, sides: &[Side]) {
-        let mut seen: Vec<Direction> = Vec::new();
-        for p in 0..self.droplets() {
-            seen.clear();
-            let of_droplet = &sides[self.first[p] as usize..self.first[p + 1] as usize];
-            seen.extend(of_droplet.iter().map(|side| self.direction(*side)));
-            let (count, block) = (seen.len(), self.blocks[p] as usize);
-            for (k, a) in seen.iter().enumerate() {
-                self.kernel[block + k * (count + 1)] = 0.75 / PI;
-                self.slopes[block + k * (count + 1)] = 0.0;
-                for (l, b) in seen.iter().enumerate().take(k) {
-                    let (kernel, slope) = between(*a, *b);
-                    let (here, there) = (block + k * count + l, block + l * count + k);
-                    self.kernel[here] = kernel;
-                    self.kernel[there] = kernel;
-                    self.slopes[here] = slope;
-                    self.slopes[there] = -slope;
+    fn fill_blocks(&mut self) {
+        const PER_TURN: f64 = 1.0 / (2.0 * PI);
+        const HALF: f64 = 0.5 * PER_TURN;
+        let [cos, sin, angle] = &self.outward;
+        for p in 0..self.sides.droplets() {
+            let (groups, rows) = (self.sides.groups_of(p), self.sides.rows_of(p));
+            let (width, count) = (groups.len(), self.sides.of(p).len());
+            let (kernel, slopes) = (&mut self.kernel[rows.clone()], &mut self.slopes[rows]);
+            for (g, group) in groups.clone().enumerate() {
+                // What the other sides have, with the factors of all entries.
+                let (cos_l, sin_l) = (cos[group], sin[group]);
+                let (cos_l, sin_l) = (times(HALF, cos_l), times(HALF, sin_l));
+                let angle_l = times(2.0, angle[group]);
+                let cos = cos[groups.clone()].as_flattened();
+                let sin = sin[groups.clone()].as_flattened();
+                let angle = angle[groups.clone()].as_flattened();
+                let rows = kernel[g..].iter_mut().step_by(width);
+                let rows = rows.zip(slopes[g..].iter_mut().step_by(width));
+                for (k, (kernel, slope)) in rows.enumerate() {
+                    let (c, s, twice) = (cos[k], sin[k], 2.0 * angle[k]);
+                    for l in 0..LANES {
+                        let difference = twice - angle_l[l]; // in [−4π, 4π]
+                        let sin = s * cos_l[l] - c * sin_l[l];
+                        let cos = c * cos_l[l] + s * sin_l[l];
+                        // 2 sign(θ) (π − |θ|)
+                        let rest = (2.0 * PI).copysign(difference) - difference;
+                        kernel[l] = (PER_TURN - rest * sin) + cos;
+                        slope[l] = rest * cos - sin;
+                    }
                 }
+            }
+            for k in 0..count {
+                kernel.as_flattened_mut()[k * (LANES * width + 1)] = 0.75 / PI;
+                slopes.as_flattened_mut()[k * (LANES * width + 1)] = 0.0;
             }
         }
     }
@@ -184,13 +203,15 @@ impl Lines {
     }
 
     pub fn droplets(&self) -> usize {
-        self.blocks.len()
+        self.sides.droplets()
     }
 
+    #[inline(always)]
     pub fn pairs(&self) -> &[[u32; 2]] {
         &self.pairs
     }
 
+    #[inline(always)]
     pub fn distances(&self) -> &[f64] {
         &self.distances
     }
@@ -200,29 +221,48 @@ impl Lines {
         &self.normals
     }
 
-    /// `Δx` of a line, from its first droplet to its second (length).
-    pub fn between(&self, line: usize) -> Vec2 {
-        self.along[line] * self.distances[line]
+    /// The components of the outward normals by sides.
+    #[inline(always)]
+    pub fn outward(&self) -> [&[Lanes]; 2] {
+        [&self.outward[0], &self.outward[1]]
     }
 
-    /// `R_i + R_j − n·Δx` of a line (length).
-    pub fn depth(&self, line: usize) -> f64 {
-        self.overlaps[line] + self.turned[line][0]
+    /// `Δx` of a line, from its first droplet to its second (length).
+    pub fn between(&self, line: usize) -> Vec2 {
+        let [x, y] = self.along.each_ref().map(|x| x[line]);
+        Vec2::new(x, y) * self.distances[line]
+    }
+
+    /// `R_i + R_j − |Δx|` of each line (length).
+    #[inline(always)]
+    pub fn overlaps(&self) -> &[f64] {
+        &self.overlaps
+    }
+
+    /// `|Δx| − n·Δx` of each line (length).
+    #[inline(always)]
+    pub fn shorter(&self) -> &[f64] {
+        &self.shorter
     }
 
     /// `n·Δx` of a line (length).
+    #[inline(always)]
     pub fn along(&self, line: usize) -> f64 {
-        self.distances[line] - self.turned[line][0]
+        self.distances[line] - self.shorter[line]
     }
 
     /// `|Δx| sin τ` of a line (length).
+    #[inline(always)]
     pub fn across(&self, line: usize) -> f64 {
-        self.turned[line][1]
+        self.across[line]
     }
 
     /// The outward direction of a side.
     pub fn direction(&self, side: Side) -> Direction {
-        let direction = self.directions[side.line as usize];
+        let line = side.line as usize;
+        let [cos, sin] = self.turned.each_ref().map(|x| x[line]);
+        let angle = self.angles[line];
+        let direction = Direction { cos, sin, angle };
         if side.is_second {
             direction.opposite()
         } else {
@@ -231,27 +271,113 @@ impl Lines {
     }
 
     /// The sides of droplet `p`.
+    #[inline(always)]
     pub fn sides(&self, p: usize) -> &[Side] {
-        &self.sides[self.first[p] as usize..self.first[p + 1] as usize]
+        self.sides.of(p)
+    }
+
+    /// Where sides stand.
+    #[inline(always)]
+    pub fn layout(&self) -> &Sides {
+        &self.sides
     }
 
     /// The number of the first side of droplet `p`.
     pub fn first_side(&self, p: usize) -> usize {
-        self.first[p] as usize
+        LANES * self.sides.groups_of(p).start
     }
 
     /// The sides that a line is of its two droplets.
+    #[inline(always)]
     pub fn sides_of(&self, line: usize) -> [usize; 2] {
-        self.sides_of[line].map(|side| side as usize)
+        self.sides.of_lines()[line].map(|side| side as usize)
+    }
+
+    /// `Â` and `G` of droplet `p`, in rows of as many groups as it has.
+    #[inline(always)]
+    pub fn blocks(&self, p: usize) -> [&[Lanes]; 2] {
+        let rows = self.sides.rows_of(p);
+        [&self.kernel[rows.clone()], &self.slopes[rows]]
     }
 
     /// `Â` and `G` between side `k` of droplet `p`, counted from its first, and each of its sides.
     pub fn rows(&self, p: usize, k: usize) -> (&[f64], &[f64]) {
-        let count = self.sides(p).len();
-        let row = self.blocks[p] as usize + k * count;
-        (
-            &self.kernel[row..row + count],
-            &self.slopes[row..row + count],
-        )
+        let (count, width) = (self.sides(p).len(), self.sides.groups_of(p).len());
+        let [kernel, slopes] = self
+            .blocks(p)
+            .map(|rows| &rows[k * width..(k + 1) * width].as_flattened()[..count]);
+        (kernel, slopes)
+    }
+}
+
+/// What is known of pairs that were there before, in the order of the pairs that there are; both ascend.
+fn carry((before, pairs): (&[[u32; 2]], &[[u32; 2]]), column: &mut Vec<f64>, room: &mut Vec<f64>) {
+    core::mem::swap(column, room);
+    column.clear();
+    let mut next = 0;
+    for pair in pairs {
+        while before.get(next).is_some_and(|old| old < pair) {
+            next += 1;
+        }
+        let same = before.get(next) == Some(pair);
+        column.push(if same { room[next] } else { 0.0 });
+    }
+}
+
+#[inline(always)]
+fn times(factor: f64, mut x: Lanes) -> Lanes {
+    for x in &mut x {
+        *x *= factor;
+    }
+    x
+}
+
+// One simple loop for each column that is made: then several lines are done at once.
+
+#[inline(always)]
+fn lengths((x, y): (&[f64], &[f64]), lengths: &mut [f64]) {
+    for ((length, x), y) in lengths.iter_mut().zip(x).zip(y) {
+        *length = (x * x + y * y).sqrt();
+    }
+}
+
+/// `x/length`, and `otherwise` where there is no length.
+#[inline(always)]
+fn unit(x: &mut [f64], lengths: &[f64], otherwise: f64) {
+    for (x, length) in x.iter_mut().zip(lengths) {
+        let unit = *x * (1.0 / length);
+        *x = if *length > 0.0 { unit } else { otherwise };
+    }
+}
+
+#[inline(always)]
+fn less(a: &[f64], b: &[f64], difference: &mut [f64]) {
+    for ((d, a), b) in difference.iter_mut().zip(a).zip(b) {
+        *d = a - b;
+    }
+}
+
+/// `2|Δx| sin²(τ/2)` and `|Δx| sin τ`.
+#[inline(always)]
+fn lean(distances: &[f64], tilts: &[f64], shorter: &mut [f64], across: &mut [f64]) {
+    let lines = distances.iter().zip(tilts);
+    for ((distance, tilt), (shorter, across)) in lines.zip(shorter.iter_mut().zip(across)) {
+        let (sin, cos) = half_turn(*tilt);
+        let twice = 2.0 * distance * sin;
+        (*shorter, *across) = (twice * sin, twice * cos);
+    }
+}
+
+/// The directions `along`, turned by the tilts.
+#[inline(always)]
+fn rotate([along_x, along_y]: &[Vec<f64>; 2], tilts: &[f64], x: &mut [f64], y: &mut [f64]) {
+    let lines = along_x.iter().zip(along_y).zip(tilts);
+    for (((e_x, e_y), tilt), (x, y)) in lines.zip(x.iter_mut().zip(y)) {
+        let (sin, cos) = half_turn(*tilt);
+        let (sin, cos) = (2.0 * sin * cos, 1.0 - 2.0 * (sin * sin));
+        let (turned_x, turned_y) = (e_x * cos - e_y * sin, e_x * sin + e_y * cos);
+        // A unit vector to the last bit that it can be: angles are told from it.
+        let one = 1.5 - 0.5 * (turned_x * turned_x + turned_y * turned_y);
+        (*x, *y) = (one * turned_x, one * turned_y);
     }
 }

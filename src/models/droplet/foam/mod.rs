@@ -32,12 +32,15 @@
 //! ```
 
 mod check;
+mod compliance;
 mod contact_problem;
+mod correction;
 mod film;
 pub(crate) mod linear;
 mod lines;
 mod model;
 mod outline;
+mod sides;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -58,6 +61,7 @@ use contact_problem::Steps;
 use linear::Linear;
 use lines::{Lines, REACH};
 use state::State;
+use tilts::Tilting;
 
 /// How soft contacts are made where droplets have no room (largest radii a γ), how often that is doubled, and the `f_max` (units of γ) below which
 /// they are made hard again.
@@ -91,6 +95,7 @@ pub struct Foam {
     forces: Vec<f64>,
     state: State,
     steps: Steps,
+    tilting: Tilting,
     contacts: FrameContacts,
     net: Vec<Vec2>,
     /// The largest net force (units of γ).
@@ -112,6 +117,7 @@ impl Foam {
             forces: Vec::new(),
             state: State::default(),
             steps: Steps::default(),
+            tilting: Tilting::default(),
             contacts: FrameContacts::default(),
             net: Vec::new(),
             f_max: 0.0,
@@ -154,19 +160,8 @@ impl Foam {
         let margin = 2.0 * (REACH - 1.0) * packing.largest_radius();
         self.near
             .update(packing, margin, 0.1 * packing.largest_radius());
-        let before = self.lines.pairs().to_vec();
-        let known = [&mut self.tilts, &mut self.forces].map(core::mem::take);
-        self.lines.set(packing, self.near.pairs());
-        let mut next = 0;
-        for pair in self.lines.pairs() {
-            while before.get(next).is_some_and(|old| old < pair) {
-                next += 1;
-            }
-            let same = before.get(next) == Some(pair);
-            let [tilt, force] = known.each_ref().map(|v| if same { v[next] } else { 0.0 });
-            self.tilts.push(tilt);
-            self.forces.push(force);
-        }
+        let known = [&mut self.tilts, &mut self.forces];
+        self.lines.set(packing, self.near.pairs(), known);
     }
 
     /// Forces at the lines and tilts at hand, to `tolerance` (length); soft ones where droplets have no room.
@@ -179,6 +174,7 @@ impl Foam {
                 .steps
                 .solve(given, &mut self.state, forces, self.films, tolerance)
             {
+                self.state.find_midpoints(&self.lines);
                 return self.has_one_image(packing, tolerance);
             }
             let give = (2.0 * self.state.give()).max(SOFT * packing.largest_radius());
@@ -276,7 +272,8 @@ impl Foam {
         self.set_lines(packing);
         for sweep in 0..SWEEPS {
             if sweep > 0 {
-                tilts::step(&self.lines, &self.state, &mut self.tilts);
+                self.tilting
+                    .step(&self.lines, &self.state, &mut self.tilts);
             }
             let tolerance = self.due(packing, 0.0);
             self.find_forces(packing, tolerance)?;

@@ -1,7 +1,9 @@
 //! [`Foam`] as a [`Model`]: what a step does with tilts and forces, and what a frame remembers.
 
-use super::contact_problem::{diagonal, violation};
-use super::{DT_MAX, Films, Foam, HARDENS, tilts};
+use super::compliance::Compliance;
+use super::contact_problem::violation;
+use super::tilts::LARGEST;
+use super::{DT_MAX, Films, Foam, HARDENS};
 use crate::contacts::Contacts;
 use crate::domain::Vec2;
 use crate::models::droplet::contact::{ACCEPTED, ContactError, due_tolerance};
@@ -19,7 +21,8 @@ impl Model for Foam {
         if goal == Goal::EXACT || self.net.len() != packing.len() {
             return self.settle(packing);
         }
-        tilts::step(&self.lines, &self.state, &mut self.tilts);
+        self.tilting
+            .step(&self.lines, &self.state, &mut self.tilts);
         self.set_lines(packing);
         if goal.f_max < HARDENS {
             self.state.set_give(0.0);
@@ -56,7 +59,7 @@ impl Model for Foam {
             [give] if *give > 0.0 && give.is_finite() => *give,
             _ => return Err(MEMORY),
         };
-        let possible = tilts.iter().all(|tilt| tilt.abs() < 1.0);
+        let possible = tilts.iter().all(|tilt| tilt.abs() <= LARGEST);
         let mut sensible = dents.iter().zip(packing.radii());
         if !possible || !sensible.all(|(d, radius)| *d < *radius && *d > -10.0 * radius) {
             return Err(MEMORY);
@@ -84,6 +87,8 @@ impl Model for Foam {
                 what: "forces that no droplets can bear",
             });
         }
+        self.state.find_midpoints(&self.lines);
+        self.state.find_midpoints(&self.lines);
         self.balance(packing);
         Ok(())
     }
@@ -138,10 +143,12 @@ impl Model for Foam {
     }
 
     fn longest_time_step(&mut self, packing: &Packing) -> Result<f64, ContactError> {
+        let mut compliance = Compliance::default();
+        compliance.find(&self.lines, &self.state);
         let mut stiffness = vec![0.0; packing.len()];
         for (c, pair) in self.lines.pairs().iter().enumerate() {
             if self.forces[c] > 0.0 {
-                let compliance = diagonal(&self.lines, &self.state, c);
+                let compliance = compliance.diagonal()[c];
                 for p in pair.map(|p| p as usize) {
                     stiffness[p] += self.line_tension / compliance;
                 }

@@ -195,7 +195,7 @@ impl Foam {
             Films::Arcs => load * pair[0] * pair[1] / (pair[0] + pair[1]),
         };
         let chord = radius - self.state.hollows(&self.lines, c)[end];
-        let middle = n * chord + t * (pair[end] * self.state.sides()[number].m);
+        let middle = n * chord + t * (pair[end] * self.state.side(number).m);
         Some(Touch {
             angle: libm::atan2(n.y, n.x),
             film: Arc {

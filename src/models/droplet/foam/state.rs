@@ -16,8 +16,9 @@
 //! Straight films (`C = 0`, `r = R/√Y`) make rounded polygons, arcs the exact wet foam. Morse and Witten's linear model has the same `Â` with
 //! `r = R`: there `ρ = R (1 − K)`. The law is derived in [`softjam::model`](crate::model).
 
-use super::film::Film;
+use super::film::{Arcs, Film};
 use super::lines::Lines;
+use super::sides::{LANES, Lanes, combine, total};
 use crate::models::droplet::kernel::Direction;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -44,7 +45,7 @@ const PASSES: usize = 100;
 const STEP: f64 = 0.3;
 
 /// What one side of a droplet has.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct OfSide {
     /// `K` and `M` (dimensionless).
     pub k: f64,
@@ -67,25 +68,35 @@ pub(super) struct OfDroplet {
 /// See the [module](self).
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
-    /// The forces (units of γ).
+    films: Option<Films>,
+    /// The forces (units of γ), by lines and by sides.
     loads: Vec<f64>,
+    pushes: Vec<Lanes>,
     /// `d = R − r` and `r` (length).
     dents: Vec<f64>,
     corners: Vec<f64>,
-    sides: Vec<OfSide>,
     droplets: Vec<OfDroplet>,
-    films: Vec<Film>,
+    /// By sides: `K`, `M`, and `r (K − F/2π) + d` (length), what `R − ρ` has beside the film.
+    kernel: Vec<Lanes>,
+    midpoints: Vec<Lanes>,
+    hollows: Vec<Lanes>,
+    /// Arcs, and by sides what a film adds to `∂ρ/∂r`; empty where films are straight.
+    arcs: Arcs,
+    chords: Vec<Lanes>,
     gaps: Vec<f64>,
     lagrangian: f64,
     /// `ε` (length/γ).
     give: f64,
-    /// Room for the residuals of the areas.
-    areas: Vec<f64>,
+    /// Room, by sides, for `ψ` and `C_ii`.
+    psi: Vec<Lanes>,
+    second: Vec<Lanes>,
+    /// Room for the steps of the corner radii (length).
+    steps: Vec<f64>,
 }
 
 impl State {
     /// Evaluates droplets of `radii` under `forces`; `false` if there are none. Corner radii are found to `tolerance` (relative), from those that
-    /// are at hand; with an infinite one they stay.
+    /// are at hand; with an infinite one they stay. Midpoints are those of the state before until they are [found](Self::find_midpoints).
     pub fn evaluate(
         &mut self,
         (lines, radii): (&Lines, &[f64]),
@@ -93,165 +104,201 @@ impl State {
         films: Films,
         tolerance: f64,
     ) -> bool {
-        self.loads.clear();
-        self.loads.extend(forces.iter().map(|f| f / line_tension));
-        self.sides.resize(2 * lines.len(), OfSide::default());
+        self.films = Some(films);
+        self.loads.resize(forces.len(), 0.0);
+        self.gaps.resize(forces.len(), 0.0);
         self.droplets.resize(radii.len(), OfDroplet::default());
-        if !wide(
-            #[inline(always)]
-            || self.load_droplets(lines, radii.len()),
-        ) {
-            return false;
+        let follows = films == Films::Straight || self.dents.len() != radii.len();
+        self.dents.resize(radii.len(), 0.0);
+        self.corners.resize(radii.len(), 0.0);
+        self.steps.resize(radii.len(), 0.0);
+        for column in [&mut self.kernel, &mut self.hollows] {
+            column.resize(lines.layout().groups(), [0.0; LANES]);
         }
-        self.find_corners((lines, radii), films, tolerance) && self.find_gaps(lines)
+        wide(
+            #[inline(always)]
+            || {
+                for (load, f) in self.loads.iter_mut().zip(forces) {
+                    *load = f / line_tension;
+                }
+                let loads = self.loads.iter().map(|f| [*f; 2]);
+                lines.layout().scatter(&mut self.pushes, loads);
+                self.load_droplets(lines, radii, follows)
+                    && (films == Films::Straight || self.find_corners(lines, radii, tolerance))
+                    && self.find_gaps(lines)
+            },
+        )
     }
 
-    /// `F`, `K`, `M` and `Y` of all droplets; `false` if there are none with such contacts.
+    /// `F`, `K` and `Y` of all droplets, and corner radii without films where these are straight or unknown; `false` if there are none with such
+    /// contacts.
     #[inline(always)]
-    fn load_droplets(&mut self, lines: &Lines, droplets: usize) -> bool {
-        for p in 0..droplets {
-            let sides = lines.sides(p);
-            let first = lines.first_side(p);
-            let of_sides = &mut self.sides[first..first + sides.len()];
-            of_sides.fill(OfSide::default());
-            let mut force = 0.0;
-            for (l, side) in sides.iter().enumerate() {
-                let f = self.loads[side.line as usize];
-                if f > 0.0 {
-                    force += f;
-                    // Row l is column l: the kernel is even, its slope odd.
-                    let (kernel, slopes) = lines.rows(p, l);
-                    for ((of_side, a), g) in of_sides.iter_mut().zip(kernel).zip(slopes) {
-                        of_side.k += a * f;
-                        of_side.m -= g * f;
-                    }
-                }
-            }
-            let mut work = 0.0;
-            for (of_side, side) in of_sides.iter().zip(sides) {
-                work += self.loads[side.line as usize] * of_side.k;
+    fn load_droplets(&mut self, lines: &Lines, radii: &[f64], follows: bool) -> bool {
+        for (p, radius) in radii.iter().enumerate() {
+            let groups = lines.layout().groups_of(p);
+            let [rows, _] = lines.blocks(p);
+            let (pushes, kernel) = (
+                &self.pushes[groups.clone()],
+                &mut self.kernel[groups.clone()],
+            );
+            let (mut force, mut work) = (0.0, 0.0);
+            for (g, (f, k)) in pushes.iter().zip(kernel).enumerate() {
+                // Row l is column l: the kernel is even.
+                let each = pushes.as_flattened().iter().copied();
+                *k = combine(rows, (g, groups.len()), each);
+                force += total(*f);
+                work += total(product(f, k));
             }
             let share = force / (2.0 * PI);
             let second = 0.5 * (force * share - work);
             let y = (force + second) / PI;
-            self.droplets[p] = OfDroplet {
-                force,
-                y,
-                second,
-                stiffness: 0.0,
-            };
             if y.is_nan() || 1.0 + y <= LEAST_Y * (1.0 + share) * (1.0 + share) {
+                if follows {
+                    self.dents.clear();
+                }
                 return false;
             }
+            let droplet = &mut self.droplets[p];
+            (droplet.force, droplet.y, droplet.second) = (force, y, second);
+            if follows {
+                // R − R/√Y
+                let root = (1.0 + y).sqrt();
+                self.dents[p] = radius * y / (root * (1.0 + root));
+            }
+            let r = radius - self.dents[p];
+            self.corners[p] = r;
+            droplet.stiffness = 2.0 * PI * radius * radius / (r * r * r);
         }
         true
     }
 
     /// The corner radii at which each droplet has its area, with the films between them.
-    fn find_corners(
-        &mut self,
-        (lines, radii): (&Lines, &[f64]),
-        films: Films,
-        tolerance: f64,
-    ) -> bool {
-        let free = |(droplet, radius): (&OfDroplet, &f64)| {
-            // R − R/√Y
-            let root = (1.0 + droplet.y).sqrt();
-            radius * droplet.y / (root * (1.0 + root))
-        };
-        if films == Films::Straight || self.dents.len() != radii.len() {
-            self.dents.clear();
-            let dents = self.droplets.iter().zip(radii).map(free);
-            self.dents.extend(dents);
-        }
-        self.follow_dents(radii);
-        self.films.clear();
-        if films == Films::Straight {
-            for ((droplet, r), radius) in self.droplets.iter_mut().zip(&self.corners).zip(radii) {
-                droplet.stiffness = 2.0 * PI * radius * radius / (r * r * r);
-            }
-            return true;
-        }
+    #[inline(always)]
+    fn find_corners(&mut self, lines: &Lines, radii: &[f64], tolerance: f64) -> bool {
+        let layout = lines.layout();
         for _ in 0..PASSES {
-            self.films.clear();
-            self.areas.clear();
-            let droplets = self.droplets.iter_mut().zip(&self.dents);
-            for ((droplet, dent), (r, radius)) in droplets.zip(self.corners.iter().zip(radii)) {
-                droplet.stiffness = 2.0 * PI * radius * radius / (r * r * r);
+            if !self.arcs.find(&self.loads, &self.corners, lines.pairs()) {
+                // The next try begins without films.
+                self.dents.clear();
+                return false;
+            }
+            let films = self.loads.iter().enumerate();
+            let films = films.map(|(c, f)| self.arcs.film(c, *f));
+            layout.scatter(&mut self.psi, films.clone().map(|film| film.psi()));
+            let second = films.map(|film| {
+                let [own, _, other] = film.second();
+                [own, other]
+            });
+            layout.scatter(&mut self.second, second);
+            // What is told of films belongs to the corner radii that stay.
+            let mut off: f64 = 0.0;
+            for (p, radius) in radii.iter().enumerate() {
+                let (dent, r, droplet) = (self.dents[p], self.corners[p], &mut self.droplets[p]);
                 // Y − R²/r²
-                self.areas
-                    .push(PI * (droplet.y - dent * (radius + r) / (r * r)));
-            }
-            for (&pair, &f) in lines.pairs().iter().zip(&self.loads) {
-                let Some(film) = Film::of(f, corners_of(&self.corners, pair)) else {
-                    // The next try begins without films.
-                    self.dents.clear();
-                    return false;
-                };
-                if f > 0.0 {
-                    let [i, j] = pair.map(|p| p as usize);
-                    let ([psi_i, psi_j], [c_ii, _, c_jj]) = (film.psi(), film.second());
-                    self.areas[i] += psi_i;
-                    self.areas[j] += psi_j;
-                    self.droplets[i].stiffness += c_ii;
-                    self.droplets[j].stiffness += c_jj;
+                let mut area = PI * (droplet.y - dent * (radius + r) / (r * r));
+                let mut stiffness = 2.0 * PI * radius * radius / (r * r * r);
+                for g in layout.groups_of(p) {
+                    area += total(self.psi[g]);
+                    stiffness += total(self.second[g]);
                 }
-                self.films.push(film);
+                droplet.stiffness = stiffness;
+                let step = area / stiffness;
+                let x = (step / r).abs();
+                off = if x > off || x.is_nan() { x } else { off };
+                self.steps[p] = step;
             }
-            // What is told of films and areas belongs to the corner radii that stay.
-            let steps = self.areas.iter().zip(&self.droplets).zip(&self.corners);
-            let off = steps.map(|((area, droplet), r)| (area / (droplet.stiffness * r)).abs());
-            if off.fold(
-                0.0,
-                |most: f64, x| if x > most || x.is_nan() { x } else { most },
-            ) <= tolerance
-            {
+            if off <= tolerance {
+                self.find_chords(lines);
                 return true;
             }
-            let droplets = self.droplets.iter().zip(&self.corners);
-            for ((dent, area), (droplet, r)) in self.dents.iter_mut().zip(&self.areas).zip(droplets)
-            {
-                *dent += (area / droplet.stiffness).clamp(-STEP * r, STEP * r);
+            let droplets = self.dents.iter_mut().zip(&mut self.corners).zip(&self.steps);
+            for (((dent, r), step), radius) in droplets.zip(radii) {
+                *dent += step.clamp(-STEP * *r, STEP * *r);
+                *r = radius - *dent;
             }
-            self.follow_dents(radii);
         }
         false
     }
 
-    /// `r = R − d`.
-    fn follow_dents(&mut self, radii: &[f64]) {
-        self.corners.clear();
-        let corners = radii.iter().zip(&self.dents);
-        self.corners
-            .extend(corners.map(|(radius, dent)| radius - dent));
+    /// What the films add to `∂ρ/∂r`.
+    #[inline(always)]
+    fn find_chords(&mut self, lines: &Lines) {
+        let chords = self.loads.iter().enumerate().map(|(c, f)| {
+            let film = self.arcs.film(c, *f);
+            let [first, second] = film.tilt();
+            [film.cos() + first, film.cos() + second]
+        });
+        lines.layout().scatter(&mut self.chords, chords);
     }
 
+    #[inline(always)]
     fn find_gaps(&mut self, lines: &Lines) -> bool {
-        self.gaps.clear();
-        self.lagrangian = 0.0;
-        for ((droplet, r), dent) in self.droplets.iter().zip(&self.corners).zip(&self.dents) {
-            self.lagrangian += r * droplet.second + PI * dent * dent / r;
-        }
-        for (c, &load) in self.loads.iter().enumerate() {
-            let [i, j] = self.hollows(lines, c);
-            let depth = lines.depth(c);
-            self.gaps.push(i + j - depth + self.give * load);
-            if load > 0.0 {
-                // r_i + r_j − n·Δx
-                let [d_i, d_j] = lines.pairs()[c].map(|p| self.dents[p as usize]);
-                let inner = depth - d_i - d_j - 0.5 * self.give * load;
-                self.lagrangian += self.film(c).energy() + load * inner;
+        let mut lagrangian = 0.0;
+        let droplets = self.droplets.iter().zip(self.dents.iter().zip(&self.corners));
+        for (p, (droplet, (dent, r))) in droplets.enumerate() {
+            // The part −f (d_i + d_j) of the contacts is summed here.
+            lagrangian += r * droplet.second + PI * dent * dent / r - droplet.force * dent;
+            let share = droplet.force / (2.0 * PI);
+            for g in lines.layout().groups_of(p) {
+                for k in 0..LANES {
+                    self.hollows[g][k] = dent + r * (self.kernel[g][k] - share);
+                }
             }
         }
-        self.lagrangian.is_finite()
+        let hollows = self.hollows.as_flattened();
+        let sides = lines.layout().of_lines().iter().zip(&self.loads);
+        let depths = lines.overlaps().iter().zip(lines.shorter());
+        for ((gap, ([a, b], load)), (overlap, shorter)) in self.gaps.iter_mut().zip(sides).zip(depths) {
+            let depth = overlap + shorter;
+            *gap = hollows[*a as usize] + hollows[*b as usize] - depth + self.give * load;
+            // r_i + r_j − n·Δx, but for the dents.
+            lagrangian += load * (depth - 0.5 * self.give * load);
+        }
+        if self.films == Some(Films::Arcs) {
+            for (c, (gap, load)) in self.gaps.iter_mut().zip(&self.loads).enumerate() {
+                let film = self.arcs.film(c, *load);
+                *gap += film.sum() * film.fall();
+                lagrangian += film.energy();
+            }
+        }
+        self.lagrangian = lagrangian;
+        lagrangian.is_finite()
+    }
+
+    /// `M` of all sides.
+    pub fn find_midpoints(&mut self, lines: &Lines) {
+        self.midpoints.resize(lines.layout().groups(), [0.0; LANES]);
+        wide(
+            #[inline(always)]
+            || {
+                for p in 0..lines.droplets() {
+                    let groups = lines.layout().groups_of(p);
+                    let [_, rows] = lines.blocks(p);
+                    let pushes = self.pushes[groups.clone()].as_flattened();
+                    for (g, m) in self.midpoints[groups.clone()].iter_mut().enumerate() {
+                        // Row l is column l with the other sign: the slope is odd.
+                        let each = pushes.iter().map(|f| -f);
+                        *m = combine(rows, (g, groups.len()), each);
+                    }
+                }
+            },
+        );
     }
 
     /// The forces (units of γ).
+    #[inline(always)]
     pub fn loads(&self) -> &[f64] {
         &self.loads
     }
 
+    /// The forces by sides (units of γ).
+    #[inline(always)]
+    pub fn pushes(&self) -> &[Lanes] {
+        &self.pushes
+    }
+
     /// `r` of each droplet (length).
+    #[inline(always)]
     pub fn corners(&self) -> &[f64] {
         &self.corners
     }
@@ -267,6 +314,7 @@ impl State {
     }
 
     /// `ε` (length/γ).
+    #[inline(always)]
     pub fn give(&self) -> f64 {
         self.give
     }
@@ -276,21 +324,47 @@ impl State {
         self.give = give;
     }
 
-    /// `K` and `M` of each side.
-    pub fn sides(&self) -> &[OfSide] {
-        &self.sides
+    /// `K` and `M` of a side.
+    pub fn side(&self, side: usize) -> OfSide {
+        OfSide {
+            k: self.kernel.as_flattened()[side],
+            m: self.midpoints.as_flattened()[side],
+        }
     }
 
+    /// `K` by sides.
+    #[inline(always)]
+    pub fn kernel_sums(&self) -> &[Lanes] {
+        &self.kernel
+    }
+
+    #[inline(always)]
     pub fn droplets(&self) -> &[OfDroplet] {
         &self.droplets
     }
 
     /// The film of a line.
-    pub fn film(&self, line: usize) -> &Film {
-        self.films.get(line).unwrap_or(&Film::STRAIGHT)
+    #[inline(always)]
+    pub fn film(&self, line: usize) -> Film {
+        if self.films == Some(Films::Arcs) {
+            self.arcs.film(line, self.loads[line])
+        } else {
+            Film::STRAIGHT
+        }
+    }
+
+    /// What films add to `∂ρ/∂r` of a group of sides.
+    #[inline(always)]
+    pub fn chords(&self, group: usize) -> Lanes {
+        if self.films == Some(Films::Arcs) {
+            self.chords[group]
+        } else {
+            [1.0; LANES]
+        }
     }
 
     /// Each line's gap (length).
+    #[inline(always)]
     pub fn gaps(&self) -> &[f64] {
         &self.gaps
     }
@@ -302,12 +376,10 @@ impl State {
 
     /// `R_i − ρ_i` and `R_j − ρ_j` of a line (length).
     pub fn hollows(&self, lines: &Lines, line: usize) -> [f64; 2] {
-        let fall = self.film(line).fall();
-        let pair = lines.pairs()[line];
+        let (fall, pair) = (self.film(line).fall(), lines.pairs()[line]);
         core::array::from_fn(|end| {
-            let (p, side) = (pair[end] as usize, lines.sides_of(line)[end]);
-            let bulge = self.droplets[p].force / (2.0 * PI) - self.sides[side].k;
-            self.dents[p] + self.corners[p] * (fall - bulge)
+            let hollow = self.hollows.as_flattened()[lines.sides_of(line)[end]];
+            hollow + self.corners[pair[end] as usize] * fall
         })
     }
 
@@ -322,23 +394,19 @@ impl State {
     }
 
     /// `T` of a line (length).
+    #[inline(always)]
     pub fn moment_arm(&self, lines: &Lines, line: usize) -> f64 {
+        let (midpoints, [a, b]) = (self.midpoints.as_flattened(), lines.sides_of(line));
         let [i, j] = lines.pairs()[line].map(|p| self.corners[p as usize]);
-        let [a, b] = lines.sides_of(line).map(|side| self.sides[side].m);
-        lines.across(line) + i * a + j * b
-    }
-
-    /// `∂ρ/∂r` of a line's two sides, `ρ/r` and what the film adds: `u` of the matrix.
-    pub fn weights(&self, lines: &Lines, line: usize) -> [f64; 2] {
-        let (film, pair) = (self.film(line), lines.pairs()[line]);
-        let tilt = film.tilt();
-        core::array::from_fn(|end| {
-            let (p, side) = (pair[end] as usize, lines.sides_of(line)[end]);
-            self.droplets[p].force / (2.0 * PI) - self.sides[side].k + film.cos() + tilt[end]
-        })
+        lines.across(line) + i * midpoints[a] + j * midpoints[b]
     }
 }
 
-fn corners_of(corners: &[f64], pair: [u32; 2]) -> [f64; 2] {
-    pair.map(|p| corners[p as usize])
+#[inline(always)]
+fn product(a: &Lanes, b: &Lanes) -> Lanes {
+    let mut product = *a;
+    for (product, b) in product.iter_mut().zip(b) {
+        *product *= b;
+    }
+    product
 }

@@ -161,6 +161,7 @@ fn single_droplets_are_those_of_thirty_digits() {
             foam.state
                 .evaluate(given, (&forces, 1.0), Films::Straight, 1e-14)
         );
+        foam.state.find_midpoints(&foam.lines);
         let state = &foam.state;
         assert!(
             (state.corners().first().unwrap() / n.r - 1.0).abs() < 1e-14,
@@ -171,7 +172,7 @@ fn single_droplets_are_those_of_thirty_digits() {
         for (c, &[i, j]) in foam.lines.pairs().iter().enumerate() {
             if i == 0 {
                 let k = j as usize - 1;
-                let side = state.sides()[foam.lines.sides_of(c)[0]];
+                let side = state.side(foam.lines.sides_of(c)[0]);
                 assert!((side.k - n.k[k]).abs() < 1e-14, "{}", n.name);
                 assert!((side.m - n.m[k]).abs() < 1e-14, "{}", n.name);
                 let chord = n.radius - state.hollows(&foam.lines, c)[0];

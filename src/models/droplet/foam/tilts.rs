@@ -10,60 +10,126 @@
 //!
 //! The last term of `k` is the answer of the forces; without it steps overshoot where forces are strong.
 
-use super::contact_problem::diagonal;
+use super::compliance::Compliance;
 use super::lines::Lines;
+use super::sides::{LANES, Lanes, total};
 use super::state::State;
-use crate::domain::Vec2;
+use crate::numerics::wide::wide;
 use core::f64::consts::PI;
 
 /// The largest tilt, and the longest step (radians).
-const LARGEST: f64 = 0.4;
+pub(super) const LARGEST: f64 = 0.4;
 const LONGEST: f64 = 0.1;
 
-/// Turns the tilts of all lines by a step, from the state at the tilts before.
-pub(super) fn step(lines: &Lines, state: &State, tilts: &mut [f64]) {
-    let (count, loads) = (lines.len(), state.loads());
-    let softness: Vec<f64> = (0..count)
-        .map(|c| 1.0 / diagonal(lines, state, c))
-        .collect();
-    let mut stiffness = vec![[0.0; 2]; count];
-    for p in 0..lines.droplets() {
-        let sides = lines.sides(p);
-        let outward = |line: usize, is_second: bool| {
-            let n = lines.normals()[line];
-            if is_second { -n } else { n }
-        };
-        let mut net = Vec2::zeros();
-        for side in sides {
-            let c = side.line as usize;
-            net += outward(c, side.is_second) * loads[c];
-        }
-        let (first, r) = (lines.first_side(p), state.corners()[p]);
-        let force = state.droplets()[p].force;
-        for (k, side) in sides.iter().enumerate() {
-            let c = side.line as usize;
-            let f = loads[c];
-            let along = net.dot(&outward(c, side.is_second));
-            let curvature = (state.sides()[first + k].k - 3.0 * f / (4.0 * PI))
-                - (force - f) / (2.0 * PI)
-                - (along - f) / PI;
-            let (_, slopes) = lines.rows(p, k);
-            let mut answer = 0.0;
-            for (slope, other) in slopes.iter().zip(sides) {
-                let l = other.line as usize;
-                if loads[l] > 0.0 {
-                    answer += (r * slope) * (r * slope) * softness[l];
+/// Sine and cosine of half a tilt, right to the last bit or its neighbour up to [`LARGEST`]: what their series leave out there is below 1e-17.
+#[inline(always)]
+pub(super) fn half_turn(tilt: f64) -> (f64, f64) {
+    const SIN: [f64; 6] = [
+        1.0,
+        -1.0 / 6.0,
+        1.0 / 120.0,
+        -1.0 / 5040.0,
+        1.0 / 362_880.0,
+        -1.0 / 39_916_800.0,
+    ];
+    const COS: [f64; 7] = [
+        1.0,
+        -1.0 / 2.0,
+        1.0 / 24.0,
+        -1.0 / 720.0,
+        1.0 / 40_320.0,
+        -1.0 / 3_628_800.0,
+        1.0 / 479_001_600.0,
+    ];
+    let half = 0.5 * tilt;
+    let square = half * half;
+    let mut sin = SIN[5];
+    for k in (1..5).rev() {
+        sin = SIN[k] + square * sin;
+    }
+    let mut cos = COS[6];
+    for k in (0..6).rev() {
+        cos = COS[k] + square * cos;
+    }
+    (half + half * (square * sin), cos)
+}
+
+/// Room for a step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tilting {
+    compliance: Compliance,
+    /// By sides: `1/B_ll` where there is a force; `r D`; and `r² Σ_l G²/B_ll`.
+    yielding: Vec<Lanes>,
+    curvatures: Vec<Lanes>,
+    answers: Vec<Lanes>,
+}
+
+impl Tilting {
+    /// Turns the tilts of all lines by a step, from the state at the tilts before.
+    pub fn step(&mut self, lines: &Lines, state: &State, tilts: &mut [f64]) {
+        self.compliance.find(lines, state);
+        wide(
+            #[inline(always)]
+            || {
+                self.find_stiffness(lines, state);
+                self.turn(lines, state, tilts);
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn find_stiffness(&mut self, lines: &Lines, state: &State) {
+        let layout = lines.layout();
+        let yields = self.compliance.diagonal().iter().zip(state.loads());
+        let yields = yields.map(|(b, load)| [if *load > 0.0 { 1.0 / b } else { 0.0 }; 2]);
+        layout.scatter(&mut self.yielding, yields);
+        self.curvatures.resize(layout.groups(), [0.0; LANES]);
+        self.answers.resize(layout.groups(), [0.0; LANES]);
+        let [x, y] = lines.outward();
+        let droplets = state.droplets().iter().zip(state.corners());
+        for (p, (droplet, r)) in droplets.enumerate() {
+            let groups = layout.groups_of(p);
+            let (mut net_x, mut net_y) = (0.0, 0.0);
+            for g in groups.clone() {
+                let f = &state.pushes()[g];
+                net_x += total(core::array::from_fn(|k| x[g][k] * f[k]));
+                net_y += total(core::array::from_fn(|k| y[g][k] * f[k]));
+            }
+            let [_, slopes] = lines.blocks(p);
+            let yielding = self.yielding[groups.clone()].as_flattened();
+            for (place, g) in groups.clone().enumerate() {
+                let (f, kernel) = (&state.pushes()[g], &state.kernel_sums()[g]);
+                let mut answer = [0.0; LANES];
+                let rows = slopes[place..].iter().step_by(groups.len());
+                for (row, yielding) in rows.zip(yielding) {
+                    for k in 0..LANES {
+                        answer[k] += row[k] * row[k] * yielding;
+                    }
+                }
+                for k in 0..LANES {
+                    let along = net_x * x[g][k] + net_y * y[g][k];
+                    let curvature = (kernel[k] - 0.75 / PI * f[k])
+                        - 0.5 / PI * (droplet.force - f[k])
+                        - 1.0 / PI * (along - f[k]);
+                    self.curvatures[g][k] = r * curvature;
+                    self.answers[g][k] = r * r * answer[k];
                 }
             }
-            stiffness[c][0] += r * curvature;
-            stiffness[c][1] += answer;
         }
     }
-    for (c, tilt) in tilts.iter_mut().enumerate() {
-        let arm = state.moment_arm(lines, c);
-        let [own, answer] = stiffness[c];
-        let distance = lines.distances()[c];
-        let k = (lines.along(c) + own).max(0.4 * distance) + 1.5 * loads[c] * answer;
-        *tilt = (*tilt - (arm / k).clamp(-LONGEST, LONGEST)).clamp(-LARGEST, LARGEST);
+
+    #[inline(always)]
+    fn turn(&self, lines: &Lines, state: &State, tilts: &mut [f64]) {
+        let curvatures = self.curvatures.as_flattened();
+        let answers = self.answers.as_flattened();
+        for (c, tilt) in tilts.iter_mut().enumerate() {
+            let [a, b] = lines.sides_of(c);
+            let own = curvatures[a] + curvatures[b];
+            let answer = answers[a] + answers[b];
+            let distance = lines.distances()[c];
+            let k = (lines.along(c) + own).max(0.4 * distance) + 1.5 * state.loads()[c] * answer;
+            let step = (state.moment_arm(lines, c) / k).clamp(-LONGEST, LONGEST);
+            *tilt = (*tilt - step).clamp(-LARGEST, LARGEST);
+        }
     }
 }
