@@ -6,7 +6,7 @@
 //! ```
 
 use super::lines::Lines;
-use super::sides::{LANES, Lanes};
+use super::sides::{LANES, Lanes, Place};
 use super::state::State;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -27,36 +27,20 @@ impl Compliance {
         let groups = lines.layout().groups();
         self.weights.resize(groups, [0.0; LANES]);
         self.shares.resize(groups, [0.0; LANES]);
-        self.diagonal.clear();
+        self.diagonal.resize(lines.len(), 0.0);
         wide(
             #[inline(always)]
             || {
-                self.find_shares(lines, state);
-                let shares = self.shares.as_flattened();
-                let give = state.give();
-                let lines = lines.layout().of_lines().iter().enumerate();
-                self.diagonal.extend(lines.map(|(c, [a, b])| {
-                    shares[*a as usize] + shares[*b as usize] + (state.film(c).softness() + give)
-                }));
+                let (weights, shares) = (&mut self.weights[..], &mut self.shares[..]);
+                find_shares(lines.layout().places(), state, weights, shares);
+                let (shares, give) = (shares.as_flattened(), state.give());
+                let sides = self.diagonal.iter_mut().zip(lines.layout().of_lines());
+                for (c, (diagonal, [a, b])) in sides.enumerate() {
+                    let film = state.film(c).softness() + give;
+                    *diagonal = shares[*a as usize] + shares[*b as usize] + film;
+                }
             },
         );
-    }
-
-    #[inline(always)]
-    fn find_shares(&mut self, lines: &Lines, state: &State) {
-        let droplets = state.droplets().iter().zip(state.corners());
-        for (p, (droplet, r)) in droplets.enumerate() {
-            let (share, own) = (droplet.force / (2.0 * PI), r / (4.0 * PI));
-            let softness = 1.0 / droplet.stiffness;
-            for g in lines.layout().groups_of(p) {
-                let (kernel, chords) = (&state.kernel_sums()[g], state.chords(g));
-                for k in 0..LANES {
-                    let u = share - kernel[k] + chords[k];
-                    self.weights[g][k] = u;
-                    self.shares[g][k] = own + u * u * softness;
-                }
-            }
-        }
     }
 
     /// `u` of each side.
@@ -69,5 +53,24 @@ impl Compliance {
     #[inline(always)]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
+    }
+}
+
+#[inline(always)]
+fn find_shares(places: &[Place], state: &State, weights: &mut [Lanes], shares: &mut [Lanes]) {
+    let (kernel, droplets) = (state.kernel_sums(), state.droplets());
+    for place in places {
+        let (droplet, r) = (&droplets[place.droplet()], state.corners()[place.droplet()]);
+        let (share, own) = (droplet.force * (0.5 / PI), r * (0.25 / PI));
+        let softness = 1.0 / droplet.stiffness;
+        for g in place.groups() {
+            let (kernel, chords) = (&kernel[g], state.chords(g));
+            let (mut u, mut of_side) = ([0.0; LANES], [0.0; LANES]);
+            for k in 0..LANES {
+                u[k] = share - kernel[k] + chords[k];
+                of_side[k] = own + u[k] * u[k] * softness;
+            }
+            (weights[g], shares[g]) = (u, of_side);
+        }
     }
 }

@@ -15,7 +15,7 @@
 
 use super::compliance::Compliance;
 use super::lines::Lines;
-use super::sides::{LANES, Lanes, combine};
+use super::sides::{LANES, Lanes, Sides, combine, with_width};
 use super::state::State;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -71,14 +71,19 @@ impl Correction {
                 scale(state, self.compliance.diagonal(), &mut self.roots);
                 let roots = self.roots.iter().map(|root| [*root as f32; 2]);
                 layout.scatter(&mut self.roots_of_sides, roots);
-                self.fill_blocks(lines, state);
+                let weights = self.compliance.weights();
+                fill_blocks(
+                    (lines, state),
+                    (&self.roots_of_sides, weights),
+                    &mut self.blocks,
+                );
                 let largest = largest(&self.roots, state.gaps());
                 if largest > 0.0 && largest.is_finite() {
                     let rest = self.residual.iter_mut().zip(&self.roots);
                     for ((rest, root), gap) in rest.zip(state.gaps()) {
                         *rest = (-gap * root / largest) as f32;
                     }
-                    self.iterate(lines, relative as f32);
+                    self.iterate(layout, relative as f32);
                 }
                 let steps = self.step.iter_mut().zip(&self.solution);
                 for ((step, x), root) in steps.zip(&self.roots) {
@@ -88,84 +93,116 @@ impl Correction {
         );
     }
 
-    /// The blocks of `B̂`.
-    #[inline(always)]
-    fn fill_blocks(&mut self, lines: &Lines, state: &State) {
-        const ROUND: f32 = (0.5 / PI) as f32;
-        let layout = lines.layout();
-        let droplets = state.droplets().iter().zip(state.corners());
-        for (p, (droplet, r)) in droplets.enumerate() {
-            let (groups, rows) = (layout.groups_of(p), layout.rows_of(p));
-            let (width, count) = (groups.len(), layout.of(p).len());
-            let [kernel, _] = lines.blocks(p);
-            let blocks = &mut self.blocks[rows];
-            let (r, softness) = (*r as f32, (1.0 / droplet.stiffness) as f32);
-            let roots = self.roots_of_sides[groups.clone()].as_flattened();
-            let weights = self.compliance.weights()[groups.clone()].as_flattened();
-            for (place, g) in groups.clone().enumerate() {
-                let (own, u) = (&self.roots_of_sides[g], &self.compliance.weights()[g]);
-                let mut u_l = [0.0; LANES];
-                for l in 0..LANES {
-                    u_l[l] = u[l] as f32;
-                }
-                let blocks = blocks[place..].iter_mut().step_by(width);
-                let rows = blocks.zip(kernel[place..].iter().step_by(width));
-                for ((block, row), (root, u)) in rows.zip(roots.iter().zip(weights)) {
-                    let (by_kernel, by_area) = (r * root, softness * *u as f32 * root);
-                    for l in 0..LANES {
-                        let entry = by_kernel * (row[l] as f32 - ROUND) + by_area * u_l[l];
-                        block[l] = entry * own[l];
-                    }
-                }
-            }
-            for k in 0..count {
-                blocks.as_flattened_mut()[k * (LANES * width + 1)] = 0.0;
-            }
-        }
-    }
-
     /// Conjugate gradients from 0 until the residual is `relative` of what it was.
     #[inline(always)]
-    fn iterate(&mut self, lines: &Lines, relative: f32) {
-        self.direction.copy_from_slice(&self.residual);
-        let mut size = dot(&self.residual, &self.residual);
+    fn iterate(&mut self, layout: &Sides, relative: f32) {
+        let (solution, residual) = (&mut self.solution[..], &mut self.residual[..]);
+        let (direction, image) = (&mut self.direction[..], &mut self.image[..]);
+        direction.copy_from_slice(residual);
+        let mut size = dot(residual, residual);
         let enough = relative * relative * size;
         for _ in 0..ITERATIONS {
             if size <= enough {
                 return;
             }
-            self.multiply(lines);
-            let curvature = dot(&self.direction, &self.image);
+            multiply_blocks(layout, &self.blocks, direction, &mut self.images_of_sides);
+            gather(layout, &self.images_of_sides, direction, image);
+            let curvature = dot(direction, image);
             if curvature.is_nan() || curvature <= 0.0 {
                 return;
             }
             let length = size / curvature;
-            advance(&mut self.solution, &self.direction, length);
-            advance(&mut self.residual, &self.image, -length);
-            let next = dot(&self.residual, &self.residual);
-            turn(&mut self.direction, &self.residual, next / size);
+            advance(solution, direction, length);
+            advance(residual, image, -length);
+            let next = dot(residual, residual);
+            turn(direction, residual, next / size);
             size = next;
         }
     }
+}
 
-    /// `image = B̂ direction`.
-    #[inline(always)]
-    fn multiply(&mut self, lines: &Lines) {
-        let layout = lines.layout();
-        for p in 0..layout.droplets() {
-            let (groups, rows) = (layout.groups_of(p), layout.rows_of(p));
-            let (width, blocks) = (groups.len(), &self.blocks[rows]);
-            for (place, image) in self.images_of_sides[groups].iter_mut().enumerate() {
-                let each = layout.of(p).iter();
-                let each = each.map(|side| self.direction[side.line as usize]);
-                *image = combine(blocks, (place, width), each);
-            }
-        }
-        let images = self.images_of_sides.as_flattened();
-        let sides = self.direction.iter().zip(layout.of_lines());
-        for (image, (own, [a, b])) in self.image.iter_mut().zip(sides) {
-            *image = own + images[*a as usize] + images[*b as usize];
-        }
+/// The blocks of `B̂`.
+#[inline(always)]
+fn fill_blocks(
+    (lines, state): (&Lines, &State),
+    (roots, weights): (&[Lanes<f32>], &[Lanes]),
+    blocks: &mut [Lanes<f32>],
+) {
+    let (kernel, places) = (lines.kernel(), lines.layout().places());
+    for place in places {
+        let (groups, p) = (place.groups(), place.droplet());
+        let (kernel, blocks) = (&kernel[place.rows()], &mut blocks[place.rows()]);
+        let (roots, weights) = (&roots[groups.clone()], &weights[groups]);
+        let r = state.corners()[p] as f32;
+        let softness = (1.0 / state.droplets()[p].stiffness) as f32;
+        with_width(
+            place.width(),
+            #[inline(always)]
+            |width| {
+                let rows = blocks
+                    .chunks_exact_mut(width)
+                    .zip(kernel.chunks_exact(width));
+                for (k, (blocks, kernel)) in rows.enumerate() {
+                    let (root, u) = (roots.as_flattened()[k], weights.as_flattened()[k]);
+                    let factors = [r * root, softness * root * u as f32];
+                    for g in 0..width {
+                        blocks[g] = row(&kernel[g], factors, &weights[g], &roots[g]);
+                    }
+                    blocks.as_flattened_mut()[k] = 0.0;
+                }
+            },
+        );
+    }
+}
+
+/// Entries of `B̂` between a side and a group, but for the diagonal.
+#[inline(always)]
+fn row(
+    kernel: &Lanes,
+    [by_kernel, by_area]: [f32; 2],
+    weights: &Lanes,
+    roots: &Lanes<f32>,
+) -> Lanes<f32> {
+    const ROUND: f32 = (0.5 / PI) as f32;
+    let mut entries = [0.0; LANES];
+    for l in 0..LANES {
+        let entry = by_kernel * (kernel[l] as f32 - ROUND) + by_area * weights[l] as f32;
+        entries[l] = entry * roots[l];
+    }
+    entries
+}
+
+/// What the blocks make of a direction.
+#[inline(always)]
+fn multiply_blocks(
+    layout: &Sides,
+    blocks: &[Lanes<f32>],
+    direction: &[f32],
+    images: &mut [Lanes<f32>],
+) {
+    for place in layout.places() {
+        let (blocks, images) = (&blocks[place.rows()], &mut images[place.groups()]);
+        let sides = layout.of(*place);
+        with_width(
+            place.width(),
+            #[inline(always)]
+            |width| {
+                for g in 0..width {
+                    let each = sides.iter().map(|side| direction[side.line as usize]);
+                    images[g] = combine(blocks, (g, width), each);
+                }
+            },
+        );
+    }
+}
+
+/// `image = B̂ direction`, from what the blocks make of it.
+#[inline(always)]
+fn gather(layout: &Sides, images: &[Lanes<f32>], direction: &[f32], image: &mut [f32]) {
+    let images = images.as_flattened();
+    let lines = direction.iter().zip(layout.of_lines());
+    for (image, (own, [a, b])) in image.iter_mut().zip(lines) {
+        *image = own + images[*a as usize] + images[*b as usize];
     }
 }
 

@@ -167,8 +167,7 @@ impl Film {
     #[inline(always)]
     pub fn second(&self) -> [f64; 3] {
         let cube = self.force * self.force * self.force;
-        let gamma =
-            cube * (self.half_h() * self.cos - 1.0) / (4.0 * (self.cos * self.sum));
+        let gamma = cube * (self.half_h() * self.cos - 1.0) / (4.0 * (self.cos * self.sum));
         let (p, m) = (1.0 + self.slope, 1.0 - self.slope);
         [gamma * p * p, -gamma * p * m, gamma * m * m]
     }

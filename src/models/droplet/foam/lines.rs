@@ -11,7 +11,7 @@
 //!
 //! Invariants: `pairs` ascend; columns by lines are as long as they are. What stands at empty places beside the sides of a droplet is finite.
 
-use super::sides::{LANES, Lanes, Side, Sides};
+use super::sides::{LANES, Lanes, Place, Side, Sides, with_width};
 use super::tilts::half_turn;
 use crate::domain::Vec2;
 use crate::models::droplet::kernel::{Angles, Direction};
@@ -60,18 +60,18 @@ impl Lines {
             || self.find(packing, near),
         );
         self.next.truncate(count);
-        if self.next != self.pairs || self.sides.droplets() != packing.len() {
+        if self.next != self.pairs || self.droplets() != packing.len() {
             core::mem::swap(&mut self.pairs, &mut self.next);
             for column in known {
                 carry((&self.next, &self.pairs), column, &mut self.known);
             }
             self.sides.number(packing.len(), &self.pairs);
         }
-        for column in self.along.iter_mut().chain([
-            &mut self.sums,
-            &mut self.distances,
-            &mut self.overlaps,
-        ]) {
+        for column in
+            self.along
+                .iter_mut()
+                .chain([&mut self.sums, &mut self.distances, &mut self.overlaps])
+        {
             column.resize(count, 0.0);
         }
         let [x, y] = &mut self.along;
@@ -116,11 +116,11 @@ impl Lines {
     /// Turns each line by its tilt.
     pub fn turn(&mut self, tilts: &[f64]) {
         let count = self.len();
-        for column in self.turned.iter_mut().chain([
-            &mut self.shorter,
-            &mut self.across,
-            &mut self.angles,
-        ]) {
+        for column in
+            self.turned
+                .iter_mut()
+                .chain([&mut self.shorter, &mut self.across, &mut self.angles])
+        {
             column.resize(count, 0.0);
         }
         for block in [&mut self.kernel, &mut self.slopes] {
@@ -137,65 +137,16 @@ impl Lines {
                 for ((n, x), y) in self.normals.iter_mut().zip(&*x).zip(&*y) {
                     *n = Vec2::new(*x, *y);
                 }
-                let seen = |c: usize| {
-                    let first = Direction {
-                        cos: x[c],
-                        sin: y[c],
-                        angle: self.angles[c],
-                    };
-                    [first, first.opposite()]
-                };
                 let [cos, sin, angle] = &mut self.outward;
-                let lines = 0..count;
+                self.sides.scatter(cos, x.iter().map(|x| [*x, -x]));
+                self.sides.scatter(sin, y.iter().map(|y| [*y, -y]));
+                let angles = self.angles.iter();
                 self.sides
-                    .scatter(cos, lines.clone().map(|c| seen(c).map(|d| d.cos)));
-                self.sides
-                    .scatter(sin, lines.clone().map(|c| seen(c).map(|d| d.sin)));
-                self.sides
-                    .scatter(angle, lines.map(|c| seen(c).map(|d| d.angle)));
-                self.fill_blocks();
+                    .scatter(angle, angles.map(|a| [*a, opposite(*a)]));
+                let blocks = (&mut self.kernel[..], &mut self.slopes[..]);
+                fill_blocks(self.sides.places(), [cos, sin, angle], blocks);
             },
         );
-    }
-
-    /// `Â` and `G` of all droplets, row by row.
-    #[inline(always)]
-    fn fill_blocks(&mut self) {
-        const PER_TURN: f64 = 1.0 / (2.0 * PI);
-        const HALF: f64 = 0.5 * PER_TURN;
-        let [cos, sin, angle] = &self.outward;
-        for p in 0..self.sides.droplets() {
-            let (groups, rows) = (self.sides.groups_of(p), self.sides.rows_of(p));
-            let (width, count) = (groups.len(), self.sides.of(p).len());
-            let (kernel, slopes) = (&mut self.kernel[rows.clone()], &mut self.slopes[rows]);
-            for (g, group) in groups.clone().enumerate() {
-                // What the other sides have, with the factors of all entries.
-                let (cos_l, sin_l) = (cos[group], sin[group]);
-                let (cos_l, sin_l) = (times(HALF, cos_l), times(HALF, sin_l));
-                let angle_l = times(2.0, angle[group]);
-                let cos = cos[groups.clone()].as_flattened();
-                let sin = sin[groups.clone()].as_flattened();
-                let angle = angle[groups.clone()].as_flattened();
-                let rows = kernel[g..].iter_mut().step_by(width);
-                let rows = rows.zip(slopes[g..].iter_mut().step_by(width));
-                for (k, (kernel, slope)) in rows.enumerate() {
-                    let (c, s, twice) = (cos[k], sin[k], 2.0 * angle[k]);
-                    for l in 0..LANES {
-                        let difference = twice - angle_l[l]; // in [−4π, 4π]
-                        let sin = s * cos_l[l] - c * sin_l[l];
-                        let cos = c * cos_l[l] + s * sin_l[l];
-                        // 2 sign(θ) (π − |θ|)
-                        let rest = (2.0 * PI).copysign(difference) - difference;
-                        kernel[l] = (PER_TURN - rest * sin) + cos;
-                        slope[l] = rest * cos - sin;
-                    }
-                }
-            }
-            for k in 0..count {
-                kernel.as_flattened_mut()[k * (LANES * width + 1)] = 0.75 / PI;
-                slopes.as_flattened_mut()[k * (LANES * width + 1)] = 0.0;
-            }
-        }
     }
 
     pub fn len(&self) -> usize {
@@ -203,7 +154,7 @@ impl Lines {
     }
 
     pub fn droplets(&self) -> usize {
-        self.sides.droplets()
+        self.sides.places().len()
     }
 
     #[inline(always)]
@@ -273,7 +224,13 @@ impl Lines {
     /// The sides of droplet `p`.
     #[inline(always)]
     pub fn sides(&self, p: usize) -> &[Side] {
-        self.sides.of(p)
+        self.sides.of(self.place(p))
+    }
+
+    /// Where the sides of droplet `p` stand.
+    #[inline(always)]
+    pub fn place(&self, p: usize) -> Place {
+        self.sides.place(p)
     }
 
     /// Where sides stand.
@@ -284,7 +241,7 @@ impl Lines {
 
     /// The number of the first side of droplet `p`.
     pub fn first_side(&self, p: usize) -> usize {
-        LANES * self.sides.groups_of(p).start
+        LANES * self.place(p).groups().start
     }
 
     /// The sides that a line is of its two droplets.
@@ -293,21 +250,80 @@ impl Lines {
         self.sides.of_lines()[line].map(|side| side as usize)
     }
 
-    /// `Â` and `G` of droplet `p`, in rows of as many groups as it has.
+    /// `Â` of all droplets, block by block.
     #[inline(always)]
-    pub fn blocks(&self, p: usize) -> [&[Lanes]; 2] {
-        let rows = self.sides.rows_of(p);
-        [&self.kernel[rows.clone()], &self.slopes[rows]]
+    pub fn kernel(&self) -> &[Lanes] {
+        &self.kernel
+    }
+
+    /// `G` of all droplets, block by block.
+    #[inline(always)]
+    pub fn slopes(&self) -> &[Lanes] {
+        &self.slopes
     }
 
     /// `Â` and `G` between side `k` of droplet `p`, counted from its first, and each of its sides.
     pub fn rows(&self, p: usize, k: usize) -> (&[f64], &[f64]) {
-        let (count, width) = (self.sides(p).len(), self.sides.groups_of(p).len());
-        let [kernel, slopes] = self
-            .blocks(p)
-            .map(|rows| &rows[k * width..(k + 1) * width].as_flattened()[..count]);
+        let place = self.place(p);
+        let first = place.rows().start + k * place.width();
+        let [kernel, slopes] = [&self.kernel, &self.slopes]
+            .map(|block| &block[first..first + place.width()].as_flattened()[..place.count()]);
         (kernel, slopes)
     }
+}
+
+/// `Â` and `G` of all droplets, row by row, from the outward directions.
+#[inline(always)]
+fn fill_blocks(
+    places: &[Place],
+    [cos, sin, angle]: [&[Lanes]; 3],
+    (kernel, slopes): (&mut [Lanes], &mut [Lanes]),
+) {
+    for place in places {
+        let (kernel, slopes) = (&mut kernel[place.rows()], &mut slopes[place.rows()]);
+        let [cos, sin, angle] = [cos, sin, angle].map(|column| &column[place.groups()]);
+        with_width(
+            place.width(),
+            #[inline(always)]
+            |width| {
+                let rows = kernel.chunks_exact_mut(width);
+                let rows = rows.zip(slopes.chunks_exact_mut(width)).enumerate();
+                for (k, (kernel, slopes)) in rows {
+                    let seen = [cos, sin, angle].map(|column| column.as_flattened()[k]);
+                    for g in 0..width {
+                        (kernel[g], slopes[g]) = row([&cos[g], &sin[g], &angle[g]], seen);
+                    }
+                    kernel.as_flattened_mut()[k] = 0.75 / PI;
+                    slopes.as_flattened_mut()[k] = 0.0;
+                }
+            },
+        );
+    }
+}
+
+/// `Â_kl` and `G_kl` of a group of sides `l` and one side `k`, by cosine, sine and angle.
+#[inline(always)]
+fn row([cos, sin, angle]: [&Lanes; 3], [c, s, a]: [f64; 3]) -> (Lanes, Lanes) {
+    const PER_TURN: f64 = 1.0 / (2.0 * PI);
+    let (c, s) = (0.5 * PER_TURN * c, 0.5 * PER_TURN * s);
+    let (mut kernel, mut slopes) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        let difference = a - angle[l]; // in [−2π, 2π]
+        // Half of sine and cosine of it, per turn; and 2 sign(θ) (π − |θ|).
+        let half_sin = s * cos[l] - c * sin[l];
+        let half_cos = c * cos[l] + s * sin[l];
+        let twice = 2.0 * (PI.copysign(difference) - difference);
+        kernel[l] = (PER_TURN - twice * half_sin) + half_cos;
+        slopes[l] = twice * half_cos - half_sin;
+    }
+    (kernel, slopes)
+}
+
+/// The angle of the opposite direction (radians).
+#[inline(always)]
+fn opposite(angle: f64) -> f64 {
+    let (cos, sin) = (0.0, 0.0);
+    Direction { cos, sin, angle }.opposite().angle
 }
 
 /// What is known of pairs that were there before, in the order of the pairs that there are; both ascend.
@@ -322,14 +338,6 @@ fn carry((before, pairs): (&[[u32; 2]], &[[u32; 2]]), column: &mut Vec<f64>, roo
         let same = before.get(next) == Some(pair);
         column.push(if same { room[next] } else { 0.0 });
     }
-}
-
-#[inline(always)]
-fn times(factor: f64, mut x: Lanes) -> Lanes {
-    for x in &mut x {
-        *x *= factor;
-    }
-    x
 }
 
 // One simple loop for each column that is made: then several lines are done at once.

@@ -272,8 +272,7 @@ impl Foam {
         self.set_lines(packing);
         for sweep in 0..SWEEPS {
             if sweep > 0 {
-                self.tilting
-                    .step(&self.lines, &self.state, &mut self.tilts);
+                self.tilting.step(&self.lines, &self.state, &mut self.tilts);
             }
             let tolerance = self.due(packing, 0.0);
             self.find_forces(packing, tolerance)?;

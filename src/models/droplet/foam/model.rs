@@ -21,8 +21,7 @@ impl Model for Foam {
         if goal == Goal::EXACT || self.net.len() != packing.len() {
             return self.settle(packing);
         }
-        self.tilting
-            .step(&self.lines, &self.state, &mut self.tilts);
+        self.tilting.step(&self.lines, &self.state, &mut self.tilts);
         self.set_lines(packing);
         if goal.f_max < HARDENS {
             self.state.set_give(0.0);

@@ -18,7 +18,7 @@
 
 use super::film::{Arcs, Film};
 use super::lines::Lines;
-use super::sides::{LANES, Lanes, combine, total};
+use super::sides::{LANES, Lanes, Place, combine, product, total, with_width};
 use crate::models::droplet::kernel::Direction;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -134,39 +134,47 @@ impl State {
     /// contacts.
     #[inline(always)]
     fn load_droplets(&mut self, lines: &Lines, radii: &[f64], follows: bool) -> bool {
-        for (p, radius) in radii.iter().enumerate() {
-            let groups = lines.layout().groups_of(p);
-            let [rows, _] = lines.blocks(p);
-            let (pushes, kernel) = (
-                &self.pushes[groups.clone()],
-                &mut self.kernel[groups.clone()],
+        let (pushes, kernel) = (&self.pushes[..], &mut self.kernel[..]);
+        let (dents, corners) = (&mut self.dents[..radii.len()], &mut self.corners[..]);
+        let droplets = &mut self.droplets[..];
+        for place in lines.layout().places() {
+            let p = place.droplet();
+            let (pushes, rows) = (&pushes[place.groups()], &lines.kernel()[place.rows()]);
+            let kernel = &mut kernel[place.groups()];
+            let (force, work) = with_width(
+                place.width(),
+                #[inline(always)]
+                |width| {
+                    let (mut force, mut work) = (0.0, 0.0);
+                    for g in 0..width {
+                        // Row l is column l: the kernel is even.
+                        let each = pushes.as_flattened().iter().copied();
+                        let sum = combine(rows, (g, width), each);
+                        force += total(pushes[g]);
+                        work += total(product(&pushes[g], &sum));
+                        kernel[g] = sum;
+                    }
+                    (force, work)
+                },
             );
-            let (mut force, mut work) = (0.0, 0.0);
-            for (g, (f, k)) in pushes.iter().zip(kernel).enumerate() {
-                // Row l is column l: the kernel is even.
-                let each = pushes.as_flattened().iter().copied();
-                *k = combine(rows, (g, groups.len()), each);
-                force += total(*f);
-                work += total(product(f, k));
-            }
-            let share = force / (2.0 * PI);
+            let (radius, droplet) = (radii[p], &mut droplets[p]);
+            let share = force * (0.5 / PI);
             let second = 0.5 * (force * share - work);
-            let y = (force + second) / PI;
+            let y = (force + second) * (1.0 / PI);
             if y.is_nan() || 1.0 + y <= LEAST_Y * (1.0 + share) * (1.0 + share) {
                 if follows {
                     self.dents.clear();
                 }
                 return false;
             }
-            let droplet = &mut self.droplets[p];
             (droplet.force, droplet.y, droplet.second) = (force, y, second);
             if follows {
                 // R − R/√Y
                 let root = (1.0 + y).sqrt();
-                self.dents[p] = radius * y / (root * (1.0 + root));
+                dents[p] = radius * y / (root * (1.0 + root));
             }
-            let r = radius - self.dents[p];
-            self.corners[p] = r;
+            let r = radius - dents[p];
+            corners[p] = r;
             droplet.stiffness = 2.0 * PI * radius * radius / (r * r * r);
         }
         true
@@ -197,7 +205,7 @@ impl State {
                 // Y − R²/r²
                 let mut area = PI * (droplet.y - dent * (radius + r) / (r * r));
                 let mut stiffness = 2.0 * PI * radius * radius / (r * r * r);
-                for g in layout.groups_of(p) {
+                for g in layout.place(p).groups() {
                     area += total(self.psi[g]);
                     stiffness += total(self.second[g]);
                 }
@@ -211,7 +219,11 @@ impl State {
                 self.find_chords(lines);
                 return true;
             }
-            let droplets = self.dents.iter_mut().zip(&mut self.corners).zip(&self.steps);
+            let droplets = self
+                .dents
+                .iter_mut()
+                .zip(&mut self.corners)
+                .zip(&self.steps);
             for (((dent, r), step), radius) in droplets.zip(radii) {
                 *dent += step.clamp(-STEP * *r, STEP * *r);
                 *r = radius - *dent;
@@ -233,27 +245,14 @@ impl State {
 
     #[inline(always)]
     fn find_gaps(&mut self, lines: &Lines) -> bool {
-        let mut lagrangian = 0.0;
-        let droplets = self.droplets.iter().zip(self.dents.iter().zip(&self.corners));
-        for (p, (droplet, (dent, r))) in droplets.enumerate() {
-            // The part −f (d_i + d_j) of the contacts is summed here.
-            lagrangian += r * droplet.second + PI * dent * dent / r - droplet.force * dent;
-            let share = droplet.force / (2.0 * PI);
-            for g in lines.layout().groups_of(p) {
-                for k in 0..LANES {
-                    self.hollows[g][k] = dent + r * (self.kernel[g][k] - share);
-                }
-            }
-        }
-        let hollows = self.hollows.as_flattened();
-        let sides = lines.layout().of_lines().iter().zip(&self.loads);
-        let depths = lines.overlaps().iter().zip(lines.shorter());
-        for ((gap, ([a, b], load)), (overlap, shorter)) in self.gaps.iter_mut().zip(sides).zip(depths) {
-            let depth = overlap + shorter;
-            *gap = hollows[*a as usize] + hollows[*b as usize] - depth + self.give * load;
-            // r_i + r_j − n·Δx, but for the dents.
-            lagrangian += load * (depth - 0.5 * self.give * load);
-        }
+        let hollows = &mut self.hollows[..];
+        let droplets = (&self.droplets[..], &self.dents[..], &self.corners[..]);
+        let places = lines.layout().places();
+        let mut lagrangian = find_hollows(places, droplets, &self.kernel, hollows);
+        let depths = (lines.overlaps(), lines.shorter());
+        let sides = (lines.layout().of_lines(), hollows.as_flattened());
+        let loads = (&self.loads[..], self.give);
+        lagrangian += find_gaps(depths, sides, loads, &mut self.gaps);
         if self.films == Some(Films::Arcs) {
             for (c, (gap, load)) in self.gaps.iter_mut().zip(&self.loads).enumerate() {
                 let film = self.arcs.film(c, *load);
@@ -271,15 +270,22 @@ impl State {
         wide(
             #[inline(always)]
             || {
-                for p in 0..lines.droplets() {
-                    let groups = lines.layout().groups_of(p);
-                    let [_, rows] = lines.blocks(p);
-                    let pushes = self.pushes[groups.clone()].as_flattened();
-                    for (g, m) in self.midpoints[groups.clone()].iter_mut().enumerate() {
-                        // Row l is column l with the other sign: the slope is odd.
-                        let each = pushes.iter().map(|f| -f);
-                        *m = combine(rows, (g, groups.len()), each);
-                    }
+                let (pushes, slopes) = (&self.pushes[..], lines.slopes());
+                let midpoints = &mut self.midpoints[..];
+                for place in lines.layout().places() {
+                    let (pushes, rows) = (&pushes[place.groups()], &slopes[place.rows()]);
+                    let midpoints = &mut midpoints[place.groups()];
+                    with_width(
+                        place.width(),
+                        #[inline(always)]
+                        |width| {
+                            for g in 0..width {
+                                // Row l is column l with the other sign: the slope is odd.
+                                let each = pushes.as_flattened().iter().map(|f| -f);
+                                midpoints[g] = combine(rows, (g, width), each);
+                            }
+                        },
+                    );
                 }
             },
         );
@@ -402,11 +408,45 @@ impl State {
     }
 }
 
+/// `r (K − F/2π) + d` of all sides, and what droplets have of `𝓛`, with the part `−f (d_i + d_j)` of their contacts.
 #[inline(always)]
-fn product(a: &Lanes, b: &Lanes) -> Lanes {
-    let mut product = *a;
-    for (product, b) in product.iter_mut().zip(b) {
-        *product *= b;
+fn find_hollows(
+    places: &[Place],
+    (droplets, dents, corners): (&[OfDroplet], &[f64], &[f64]),
+    kernel: &[Lanes],
+    hollows: &mut [Lanes],
+) -> f64 {
+    let mut lagrangian = 0.0;
+    for place in places {
+        let p = place.droplet();
+        let (droplet, dent, r) = (&droplets[p], dents[p], corners[p]);
+        lagrangian += r * droplet.second + (PI * dent * dent / r - droplet.force * dent);
+        let share = droplet.force * (0.5 / PI);
+        for g in place.groups() {
+            let (kernel, mut hollow) = (&kernel[g], [0.0; LANES]);
+            for k in 0..LANES {
+                hollow[k] = dent + r * (kernel[k] - share);
+            }
+            hollows[g] = hollow;
+        }
     }
-    product
+    lagrangian
+}
+
+/// The gaps between straight films, and what contacts have of `𝓛`: `f (R_i + R_j − n·Δx)`.
+#[inline(always)]
+fn find_gaps(
+    (overlaps, shorter): (&[f64], &[f64]),
+    (sides, hollows): (&[[u32; 2]], &[f64]),
+    (loads, give): (&[f64], f64),
+    gaps: &mut [f64],
+) -> f64 {
+    let mut lagrangian = 0.0;
+    let lines = overlaps.iter().zip(shorter).zip(sides.iter().zip(loads));
+    for (gap, ((overlap, shorter), ([a, b], load))) in gaps.iter_mut().zip(lines) {
+        let (depth, soft) = (overlap + shorter, give * load);
+        *gap = hollows[*a as usize] + hollows[*b as usize] - depth + soft;
+        lagrangian += load * (depth - 0.5 * soft);
+    }
+    lagrangian
 }

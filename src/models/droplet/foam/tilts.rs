@@ -12,7 +12,7 @@
 
 use super::compliance::Compliance;
 use super::lines::Lines;
-use super::sides::{LANES, Lanes, total};
+use super::sides::{LANES, Lanes, product, total, with_width};
 use super::state::State;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -71,65 +71,92 @@ impl Tilting {
         wide(
             #[inline(always)]
             || {
-                self.find_stiffness(lines, state);
+                self.prepare(lines, state);
                 self.turn(lines, state, tilts);
             },
         );
     }
 
     #[inline(always)]
-    fn find_stiffness(&mut self, lines: &Lines, state: &State) {
+    fn prepare(&mut self, lines: &Lines, state: &State) {
         let layout = lines.layout();
         let yields = self.compliance.diagonal().iter().zip(state.loads());
         let yields = yields.map(|(b, load)| [if *load > 0.0 { 1.0 / b } else { 0.0 }; 2]);
         layout.scatter(&mut self.yielding, yields);
         self.curvatures.resize(layout.groups(), [0.0; LANES]);
         self.answers.resize(layout.groups(), [0.0; LANES]);
-        let [x, y] = lines.outward();
-        let droplets = state.droplets().iter().zip(state.corners());
-        for (p, (droplet, r)) in droplets.enumerate() {
-            let groups = layout.groups_of(p);
-            let (mut net_x, mut net_y) = (0.0, 0.0);
-            for g in groups.clone() {
-                let f = &state.pushes()[g];
-                net_x += total(core::array::from_fn(|k| x[g][k] * f[k]));
-                net_y += total(core::array::from_fn(|k| y[g][k] * f[k]));
-            }
-            let [_, slopes] = lines.blocks(p);
-            let yielding = self.yielding[groups.clone()].as_flattened();
-            for (place, g) in groups.clone().enumerate() {
-                let (f, kernel) = (&state.pushes()[g], &state.kernel_sums()[g]);
-                let mut answer = [0.0; LANES];
-                let rows = slopes[place..].iter().step_by(groups.len());
-                for (row, yielding) in rows.zip(yielding) {
-                    for k in 0..LANES {
-                        answer[k] += row[k] * row[k] * yielding;
-                    }
-                }
-                for k in 0..LANES {
-                    let along = net_x * x[g][k] + net_y * y[g][k];
-                    let curvature = (kernel[k] - 0.75 / PI * f[k])
-                        - 0.5 / PI * (droplet.force - f[k])
-                        - 1.0 / PI * (along - f[k]);
-                    self.curvatures[g][k] = r * curvature;
-                    self.answers[g][k] = r * r * answer[k];
-                }
-            }
-        }
+        let columns = (&mut self.curvatures[..], &mut self.answers[..]);
+        find_stiffness(lines, state, &self.yielding, columns);
     }
 
     #[inline(always)]
     fn turn(&self, lines: &Lines, state: &State, tilts: &mut [f64]) {
-        let curvatures = self.curvatures.as_flattened();
-        let answers = self.answers.as_flattened();
+        let (curvatures, answers) = (&self.curvatures[..], &self.answers[..]);
+        let (curvatures, answers) = (curvatures.as_flattened(), answers.as_flattened());
+        let loads = state.loads();
         for (c, tilt) in tilts.iter_mut().enumerate() {
             let [a, b] = lines.sides_of(c);
             let own = curvatures[a] + curvatures[b];
             let answer = answers[a] + answers[b];
             let distance = lines.distances()[c];
-            let k = (lines.along(c) + own).max(0.4 * distance) + 1.5 * state.loads()[c] * answer;
+            let k = (lines.along(c) + own).max(0.4 * distance) + 1.5 * loads[c] * answer;
             let step = (state.moment_arm(lines, c) / k).clamp(-LONGEST, LONGEST);
             *tilt = (*tilt - step).clamp(-LARGEST, LARGEST);
+        }
+    }
+}
+
+/// `r D` and `r² Σ_l G²/B_ll` of all sides.
+#[inline(always)]
+fn find_stiffness(
+    lines: &Lines,
+    state: &State,
+    yielding: &[Lanes],
+    (curvatures, answers): (&mut [Lanes], &mut [Lanes]),
+) {
+    let ([x, y], slopes) = (lines.outward(), lines.slopes());
+    let (pushes, kernel) = (state.pushes(), state.kernel_sums());
+    for place in lines.layout().places() {
+        let groups = place.groups();
+        let (droplet, r) = (
+            &state.droplets()[place.droplet()],
+            state.corners()[place.droplet()],
+        );
+        let (mut net_x, mut net_y) = (0.0, 0.0);
+        for g in groups.clone() {
+            net_x += total(product(&x[g], &pushes[g]));
+            net_y += total(product(&y[g], &pushes[g]));
+        }
+        let rows = &slopes[place.rows()];
+        let yielding = yielding[groups.clone()].as_flattened();
+        with_width(
+            place.width(),
+            #[inline(always)]
+            |width| {
+                for at in 0..width {
+                    let mut answer = [0.0; LANES];
+                    for (row, yielding) in rows[at..].chunks(width).zip(yielding) {
+                        for l in 0..LANES {
+                            answer[l] += row[0][l] * row[0][l] * yielding;
+                        }
+                    }
+                    answers[groups.start + at] = answer;
+                }
+            },
+        );
+        for g in groups {
+            let (f, kernel, x, y) = (&pushes[g], &kernel[g], &x[g], &y[g]);
+            let mut answer = answers[g];
+            let mut curvature = [0.0; LANES];
+            for k in 0..LANES {
+                let along = net_x * x[k] + net_y * y[k];
+                curvature[k] = r
+                    * ((kernel[k] - 0.75 / PI * f[k])
+                        - 0.5 / PI * (droplet.force - f[k])
+                        - 1.0 / PI * (along - f[k]));
+                answer[k] *= r * r;
+            }
+            (curvatures[g], answers[g]) = (curvature, answer);
         }
     }
 }
