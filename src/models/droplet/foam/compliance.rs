@@ -35,9 +35,9 @@ impl Compliance {
                 find_shares(lines.layout().places(), state, weights, shares);
                 let (shares, give) = (shares.as_flattened(), state.give());
                 let sides = self.diagonal.iter_mut().zip(lines.layout().of_lines());
-                for (c, (diagonal, [a, b])) in sides.enumerate() {
-                    let film = state.film(c).softness() + give;
-                    *diagonal = shares[*a as usize] + shares[*b as usize] + film;
+                for ((diagonal, [a, b]), softness) in sides.zip(state.softness()) {
+                    let (a, b) = (shares[*a as usize], shares[*b as usize]);
+                    *diagonal = a + b + (softness + give);
                 }
             },
         );

@@ -8,7 +8,7 @@
 //! B_kl = −∂²𝓛/∂f_k∂f_l = Σ_p r (Â_kl − 1/2π)  +  u (𝓛_rr)⁻¹ uᵀ  −  δ_kl C_ff,      u_k = ∂²𝓛/∂f_k∂r
 //! ```
 //!
-//! with `(𝓛_rr)⁻¹` from its diagonal: what films put beside it is little, and is left to the next step.
+//! with `(𝓛_rr)⁻¹` from its diagonal and, where films bear much, what lies beside it ([`Coupling`](super::coupling)).
 //!
 use super::correction::Correction;
 use super::lines::Lines;
@@ -81,7 +81,7 @@ impl Steps {
     ) -> bool {
         let radii = lines.1;
         let mean = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
-        let corner_tolerance = 0.05 * tolerance / mean;
+        let corner_tolerance = 0.1 * tolerance / mean;
         if !state.evaluate(lines, (forces, line_tension), films, corner_tolerance) {
             forces.fill(0.0);
             if !state.evaluate(lines, (forces, line_tension), films, corner_tolerance) {

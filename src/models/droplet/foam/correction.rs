@@ -14,6 +14,7 @@
 //! - Sums are those of [`CHAINS`] chains in the order of the lines, which follows from the pairs alone.
 
 use super::compliance::Compliance;
+use super::coupling::Coupling;
 use super::lines::Lines;
 use super::sides::{LANES, Lanes, Sides, combine, with_width};
 use super::state::State;
@@ -29,6 +30,7 @@ const ITERATIONS: usize = 1000;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Correction {
     compliance: Compliance,
+    coupling: Coupling,
     /// `D^(−½)` by lines, and by sides.
     roots: Vec<f64>,
     roots_of_sides: Vec<Lanes<f32>>,
@@ -77,13 +79,15 @@ impl Correction {
                     (&self.roots_of_sides, weights),
                     &mut self.blocks,
                 );
+                self.coupling
+                    .find(lines, state, weights.as_flattened(), &self.roots);
                 let largest = largest(&self.roots, state.gaps());
                 if largest > 0.0 && largest.is_finite() {
                     let rest = self.residual.iter_mut().zip(&self.roots);
                     for ((rest, root), gap) in rest.zip(state.gaps()) {
                         *rest = (-gap * root / largest) as f32;
                     }
-                    self.iterate(layout, relative as f32);
+                    self.iterate(lines, relative as f32);
                 }
                 let steps = self.step.iter_mut().zip(&self.solution);
                 for ((step, x), root) in steps.zip(&self.roots) {
@@ -95,7 +99,8 @@ impl Correction {
 
     /// Conjugate gradients from 0 until the residual is `relative` of what it was.
     #[inline(always)]
-    fn iterate(&mut self, layout: &Sides, relative: f32) {
+    fn iterate(&mut self, lines: &Lines, relative: f32) {
+        let layout = lines.layout();
         let (solution, residual) = (&mut self.solution[..], &mut self.residual[..]);
         let (direction, image) = (&mut self.direction[..], &mut self.image[..]);
         direction.copy_from_slice(residual);
@@ -107,6 +112,7 @@ impl Correction {
             }
             multiply_blocks(layout, &self.blocks, direction, &mut self.images_of_sides);
             gather(layout, &self.images_of_sides, direction, image);
+            self.coupling.add(lines.pairs(), direction, image);
             let curvature = dot(direction, image);
             if curvature.is_nan() || curvature <= 0.0 {
                 return;

@@ -180,6 +180,9 @@ pub(super) struct Arcs {
     slopes: Vec<f64>,
     cosines: Vec<f64>,
     arcs: Vec<f64>,
+    /// Room for what films have.
+    first: Vec<f64>,
+    second: Vec<f64>,
 }
 
 impl Arcs {
@@ -191,6 +194,8 @@ impl Arcs {
             &mut self.slopes,
             &mut self.cosines,
             &mut self.arcs,
+            &mut self.first,
+            &mut self.second,
         ] {
             column.resize(loads.len(), 0.0);
         }
@@ -210,6 +215,15 @@ impl Arcs {
         steepest < STEEPEST
     }
 
+    /// Two numbers of each film, which bear such loads (units of γ).
+    #[inline(always)]
+    pub fn each(&mut self, loads: &[f64], of: impl Fn(Film) -> [f64; 2]) -> [&[f64]; 2] {
+        let given = (&self.sums[..], &self.slopes[..]);
+        let given = (given, (&self.cosines[..], &self.arcs[..]), loads);
+        columns(given, (&mut self.first, &mut self.second), of);
+        [&self.first, &self.second]
+    }
+
     /// That of a line, which bears `force` (units of γ).
     #[inline(always)]
     pub fn film(&self, line: usize, force: f64) -> Film {
@@ -220,6 +234,30 @@ impl Arcs {
             cos: self.cosines[line],
             arc: self.arcs[line],
         }
+    }
+}
+
+/// Numbers of films, several at once.
+#[inline(always)]
+fn columns(
+    ((sums, slopes), (cosines, arcs), loads): ((&[f64], &[f64]), (&[f64], &[f64]), &[f64]),
+    (first, second): (&mut [f64], &mut [f64]),
+    of: impl Fn(Film) -> [f64; 2],
+) {
+    let films = sums
+        .iter()
+        .zip(slopes)
+        .zip(cosines.iter().zip(arcs))
+        .zip(loads);
+    let films = films.map(|(((sum, slope), (cos, arc)), force)| Film {
+        force: *force,
+        sum: *sum,
+        slope: *slope,
+        cos: *cos,
+        arc: *arc,
+    });
+    for ((first, second), film) in first.iter_mut().zip(second).zip(films) {
+        [*first, *second] = of(film);
     }
 }
 

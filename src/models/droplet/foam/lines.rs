@@ -196,16 +196,10 @@ impl Lines {
         &self.shorter
     }
 
-    /// `n·Δx` of a line (length).
+    /// `|Δx| sin τ` of each line (length).
     #[inline(always)]
-    pub fn along(&self, line: usize) -> f64 {
-        self.distances[line] - self.shorter[line]
-    }
-
-    /// `|Δx| sin τ` of a line (length).
-    #[inline(always)]
-    pub fn across(&self, line: usize) -> f64 {
-        self.across[line]
+    pub fn across(&self) -> &[f64] {
+        &self.across
     }
 
     /// The outward direction of a side.
@@ -240,6 +234,10 @@ impl Lines {
     }
 
     /// The number of the first side of droplet `p`.
+    #[cfg_attr(
+        not(test),
+        expect(dead_code, reason = "for derivatives by tilts and positions")
+    )]
     pub fn first_side(&self, p: usize) -> usize {
         LANES * self.place(p).groups().start
     }
@@ -263,6 +261,10 @@ impl Lines {
     }
 
     /// `Â` and `G` between side `k` of droplet `p`, counted from its first, and each of its sides.
+    #[cfg_attr(
+        not(test),
+        expect(dead_code, reason = "for derivatives by tilts and positions")
+    )]
     pub fn rows(&self, p: usize, k: usize) -> (&[f64], &[f64]) {
         let place = self.place(p);
         let first = place.rows().start + k * place.width();
@@ -387,5 +389,55 @@ fn rotate([along_x, along_y]: &[Vec<f64>; 2], tilts: &[f64], x: &mut [f64], y: &
         // A unit vector to the last bit that it can be: angles are told from it.
         let one = 1.5 - 0.5 * (turned_x * turned_x + turned_y * turned_y);
         (*x, *y) = (one * turned_x, one * turned_y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::state::{Films, State};
+    use super::*;
+    use crate::domain::Domain;
+    use crate::models::droplet::kernel::{dg, g};
+
+    #[test]
+    fn droplets_with_many_sides_have_the_kernel_between_all_of_them() {
+        for count in [1, 7, 8, 9, 20] {
+            let at = |k: usize| 2.0 * PI * k as f64 / count as f64 - 3.0;
+            let centre = Vec2::new(10.0, 10.0);
+            let mut positions = vec![centre];
+            positions.extend((0..count).map(|k| {
+                let (sin, cos) = libm::sincos(at(k));
+                centre + 3.4 * Vec2::new(cos, sin)
+            }));
+            let mut radii = vec![0.4; count + 1];
+            radii[0] = 3.0;
+            let packing = Packing::new(Domain::new(20.0, 20.0).unwrap(), radii, positions).unwrap();
+            let near: Vec<[u32; 2]> = (1..=count as u32).map(|k| [0, k]).collect();
+            let (mut lines, mut state) = (Lines::default(), State::default());
+            lines.set(&packing, &near, [&mut Vec::new(), &mut Vec::new()]);
+            lines.turn(&vec![0.0; count]);
+            let forces: Vec<f64> = (0..count).map(|k| 0.01 * (1 + k % 3) as f64).collect();
+            let given = (&lines, packing.radii());
+            assert!(state.evaluate(given, (&forces, 1.0), Films::Straight, 1e-14));
+            state.find_midpoints(&lines);
+            for k in 0..count {
+                let (kernel, slopes) = lines.rows(0, k);
+                assert_eq!((kernel.len(), slopes.len()), (count, count));
+                let (mut of_kernel, mut of_slopes) = (0.0, 0.0);
+                for l in 0..count {
+                    let angle = at(k) - at(l);
+                    // The slope is odd.
+                    let slope = dg(angle.abs()) / (2.0 * PI);
+                    let slope = if k > l { slope } else { -slope };
+                    let slope = if k == l { 0.0 } else { slope };
+                    assert!((kernel[l] + g(angle) / (2.0 * PI)).abs() < 1e-14);
+                    assert!((slopes[l] - slope).abs() < 1e-14);
+                    of_kernel -= forces[l] * g(angle) / (2.0 * PI);
+                    of_slopes += forces[l] * slope;
+                }
+                let side = state.side(lines.first_side(0) + k);
+                assert!((side.k - of_kernel).abs() < 1e-14 && (side.m - of_slopes).abs() < 1e-14);
+            }
+        }
     }
 }

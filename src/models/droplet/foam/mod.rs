@@ -35,8 +35,10 @@ mod check;
 mod compliance;
 mod contact_problem;
 mod correction;
+mod coupling;
 mod film;
 pub(crate) mod linear;
+mod gaps;
 mod lines;
 mod model;
 mod outline;
@@ -71,6 +73,9 @@ const HARDENS: f64 = 1e-2;
 
 /// The least violation of the contact law, relative to the largest `|δ|`, that is asked for: what rounding leaves of gaps.
 const LEAST_TOLERANCE: f64 = 1e-13;
+
+/// What the list of near pairs has beyond those that get a line (largest radii).
+const SKIN: f64 = 0.2;
 
 /// Sweeps over all tilts that a start may take; each takes a contact problem.
 const SWEEPS: usize = 200;
@@ -155,11 +160,11 @@ impl Foam {
         sums
     }
 
-    /// The lines at new positions; what was known of a pair stays with it.
-    fn set_lines(&mut self, packing: &Packing) {
+    /// The lines at new positions, none of which has moved by more than `moved` (length); what was known of a pair stays with it.
+    fn set_lines(&mut self, packing: &Packing, moved: f64) {
         let margin = 2.0 * (REACH - 1.0) * packing.largest_radius();
-        self.near
-            .update(packing, margin, 0.1 * packing.largest_radius());
+        let skin = SKIN * packing.largest_radius();
+        self.near.update_after(packing, margin, skin, moved);
         let known = [&mut self.tilts, &mut self.forces];
         self.lines.set(packing, self.near.pairs(), known);
     }
@@ -269,7 +274,7 @@ impl Foam {
 
     /// Forces and tilts together, from those at hand: a sweep over the tilts after each contact problem, until no midpoints are apart.
     fn settle(&mut self, packing: &Packing) -> Result<(), ContactError> {
-        self.set_lines(packing);
+        self.set_lines(packing, f64::INFINITY);
         for sweep in 0..SWEEPS {
             if sweep > 0 {
                 self.tilting.step(&self.lines, &self.state, &mut self.tilts);

@@ -22,7 +22,7 @@ impl Model for Foam {
             return self.settle(packing);
         }
         self.tilting.step(&self.lines, &self.state, &mut self.tilts);
-        self.set_lines(packing);
+        self.set_lines(packing, goal.moved);
         if goal.f_max < HARDENS {
             self.state.set_give(0.0);
         }
@@ -42,7 +42,7 @@ impl Model for Foam {
         const MEMORY: FrameError = FrameError::Foreign {
             what: "a memory that is not that of its droplets",
         };
-        self.set_lines(packing);
+        self.set_lines(packing, f64::INFINITY);
         let lines = self.lines.len();
         let dents = match self.films {
             Films::Straight => 0,

@@ -99,7 +99,8 @@ impl Sides {
         let (mut group, mut row) = (0, 0);
         for (number, place) in (0..).zip(&mut self.places) {
             self.of_droplets[place.droplet()] = number;
-            let width = place.count.div_ceil(LANES as u32);
+            // A group for those without sides, too: no loop has to ask.
+            let width = place.count.div_ceil(LANES as u32).max(1);
             (place.group, place.width, place.row) = (group, width, row);
             group += width;
             row += width * place.count;

@@ -17,8 +17,9 @@
 //! `r = R`: there `ρ = R (1 − K)`. The law is derived in [`softjam::model`](crate::model).
 
 use super::film::{Arcs, Film};
+use super::gaps::{find_gaps, find_hollows, pairs_of};
 use super::lines::Lines;
-use super::sides::{LANES, Lanes, Place, combine, product, total, with_width};
+use super::sides::{LANES, Lanes, combine, product, total, with_width};
 use crate::models::droplet::kernel::Direction;
 use crate::numerics::wide::wide;
 use core::f64::consts::PI;
@@ -48,6 +49,10 @@ const STEP: f64 = 0.3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OfSide {
     /// `K` and `M` (dimensionless).
+    #[cfg_attr(
+        not(test),
+        expect(dead_code, reason = "for derivatives by tilts and positions")
+    )]
     pub k: f64,
     pub m: f64,
 }
@@ -60,7 +65,7 @@ pub(super) struct OfDroplet {
     /// `Y − 1`.
     pub y: f64,
     /// `F²/4π − fᵀK/2`: what `πy` has beside `F`.
-    second: f64,
+    pub second: f64,
     /// `𝓛_rr` on the diagonal, `2πR²/r³ + Σ C_ii` (force/length).
     pub stiffness: f64,
 }
@@ -83,14 +88,15 @@ pub(super) struct State {
     /// Arcs, and by sides what a film adds to `∂ρ/∂r`; empty where films are straight.
     arcs: Arcs,
     chords: Vec<Lanes>,
+    /// `−C_ff` by lines (length/force).
+    softness: Vec<f64>,
     gaps: Vec<f64>,
     lagrangian: f64,
     /// `ε` (length/γ).
     give: f64,
-    /// Room, by sides, for `ψ` and `C_ii`.
+    /// Room: `ψ` and `C_ii` by sides, and the steps of the corner radii (length).
     psi: Vec<Lanes>,
     second: Vec<Lanes>,
-    /// Room for the steps of the corner radii (length).
     steps: Vec<f64>,
 }
 
@@ -107,6 +113,7 @@ impl State {
         self.films = Some(films);
         self.loads.resize(forces.len(), 0.0);
         self.gaps.resize(forces.len(), 0.0);
+        self.softness.resize(forces.len(), 0.0);
         self.droplets.resize(radii.len(), OfDroplet::default());
         let follows = films == Films::Straight || self.dents.len() != radii.len();
         self.dents.resize(radii.len(), 0.0);
@@ -190,30 +197,39 @@ impl State {
                 self.dents.clear();
                 return false;
             }
-            let films = self.loads.iter().enumerate();
-            let films = films.map(|(c, f)| self.arcs.film(c, *f));
-            layout.scatter(&mut self.psi, films.clone().map(|film| film.psi()));
-            let second = films.map(|film| {
-                let [own, _, other] = film.second();
-                [own, other]
-            });
-            layout.scatter(&mut self.second, second);
+            let psi = self.arcs.each(
+                &self.loads,
+                #[inline(always)]
+                |film| film.psi(),
+            );
+            layout.scatter(&mut self.psi, pairs_of(psi));
+            let second = self.arcs.each(
+                &self.loads,
+                #[inline(always)]
+                |film| {
+                    let [own, _, other] = film.second();
+                    [own, other]
+                },
+            );
+            layout.scatter(&mut self.second, pairs_of(second));
             // What is told of films belongs to the corner radii that stay.
             let mut off: f64 = 0.0;
-            for (p, radius) in radii.iter().enumerate() {
-                let (dent, r, droplet) = (self.dents[p], self.corners[p], &mut self.droplets[p]);
+            let (dents, corners) = (&self.dents[..], &self.corners[..]);
+            let (droplets, steps) = (&mut self.droplets[..], &mut self.steps[..]);
+            for place in layout.places() {
+                let p = place.droplet();
+                let (radius, dent, r, droplet) = (radii[p], dents[p], corners[p], &mut droplets[p]);
                 // Y − R²/r²
                 let mut area = PI * (droplet.y - dent * (radius + r) / (r * r));
                 let mut stiffness = 2.0 * PI * radius * radius / (r * r * r);
-                for g in layout.place(p).groups() {
+                for g in place.groups() {
                     area += total(self.psi[g]);
                     stiffness += total(self.second[g]);
                 }
                 droplet.stiffness = stiffness;
-                let step = area / stiffness;
-                let x = (step / r).abs();
+                steps[p] = area / stiffness;
+                let x = (steps[p] / r).abs();
                 off = if x > off || x.is_nan() { x } else { off };
-                self.steps[p] = step;
             }
             if off <= tolerance {
                 self.find_chords(lines);
@@ -235,12 +251,21 @@ impl State {
     /// What the films add to `∂ρ/∂r`.
     #[inline(always)]
     fn find_chords(&mut self, lines: &Lines) {
-        let chords = self.loads.iter().enumerate().map(|(c, f)| {
-            let film = self.arcs.film(c, *f);
-            let [first, second] = film.tilt();
-            [film.cos() + first, film.cos() + second]
-        });
-        lines.layout().scatter(&mut self.chords, chords);
+        let chords = self.arcs.each(
+            &self.loads,
+            #[inline(always)]
+            |film| {
+                let [first, second] = film.tilt();
+                [film.cos() + first, film.cos() + second]
+            },
+        );
+        lines.layout().scatter(&mut self.chords, pairs_of(chords));
+        let [softness, _] = self.arcs.each(
+            &self.loads,
+            #[inline(always)]
+            |film| [film.softness(), 0.0],
+        );
+        self.softness.copy_from_slice(softness);
     }
 
     #[inline(always)]
@@ -254,10 +279,14 @@ impl State {
         let loads = (&self.loads[..], self.give);
         lagrangian += find_gaps(depths, sides, loads, &mut self.gaps);
         if self.films == Some(Films::Arcs) {
-            for (c, (gap, load)) in self.gaps.iter_mut().zip(&self.loads).enumerate() {
-                let film = self.arcs.film(c, *load);
-                *gap += film.sum() * film.fall();
-                lagrangian += film.energy();
+            let [falls, energies] = self.arcs.each(
+                &self.loads,
+                #[inline(always)]
+                |film| [film.sum() * film.fall(), film.energy()],
+            );
+            for ((gap, fall), energy) in self.gaps.iter_mut().zip(falls).zip(energies) {
+                *gap += fall;
+                lagrangian += energy;
             }
         }
         self.lagrangian = lagrangian;
@@ -369,6 +398,18 @@ impl State {
         }
     }
 
+    /// `−C_ff` of each line (length/force), 0 where films are straight.
+    #[inline(always)]
+    pub fn softness(&self) -> &[f64] {
+        &self.softness
+    }
+
+    /// `M` by sides.
+    #[inline(always)]
+    pub fn midpoints(&self) -> &[Lanes] {
+        &self.midpoints
+    }
+
     /// Each line's gap (length).
     #[inline(always)]
     pub fn gaps(&self) -> &[f64] {
@@ -404,49 +445,6 @@ impl State {
     pub fn moment_arm(&self, lines: &Lines, line: usize) -> f64 {
         let (midpoints, [a, b]) = (self.midpoints.as_flattened(), lines.sides_of(line));
         let [i, j] = lines.pairs()[line].map(|p| self.corners[p as usize]);
-        lines.across(line) + i * midpoints[a] + j * midpoints[b]
+        lines.across()[line] + i * midpoints[a] + j * midpoints[b]
     }
-}
-
-/// `r (K − F/2π) + d` of all sides, and what droplets have of `𝓛`, with the part `−f (d_i + d_j)` of their contacts.
-#[inline(always)]
-fn find_hollows(
-    places: &[Place],
-    (droplets, dents, corners): (&[OfDroplet], &[f64], &[f64]),
-    kernel: &[Lanes],
-    hollows: &mut [Lanes],
-) -> f64 {
-    let mut lagrangian = 0.0;
-    for place in places {
-        let p = place.droplet();
-        let (droplet, dent, r) = (&droplets[p], dents[p], corners[p]);
-        lagrangian += r * droplet.second + (PI * dent * dent / r - droplet.force * dent);
-        let share = droplet.force * (0.5 / PI);
-        for g in place.groups() {
-            let (kernel, mut hollow) = (&kernel[g], [0.0; LANES]);
-            for k in 0..LANES {
-                hollow[k] = dent + r * (kernel[k] - share);
-            }
-            hollows[g] = hollow;
-        }
-    }
-    lagrangian
-}
-
-/// The gaps between straight films, and what contacts have of `𝓛`: `f (R_i + R_j − n·Δx)`.
-#[inline(always)]
-fn find_gaps(
-    (overlaps, shorter): (&[f64], &[f64]),
-    (sides, hollows): (&[[u32; 2]], &[f64]),
-    (loads, give): (&[f64], f64),
-    gaps: &mut [f64],
-) -> f64 {
-    let mut lagrangian = 0.0;
-    let lines = overlaps.iter().zip(shorter).zip(sides.iter().zip(loads));
-    for (gap, ((overlap, shorter), ([a, b], load))) in gaps.iter_mut().zip(lines) {
-        let (depth, soft) = (overlap + shorter, give * load);
-        *gap = hollows[*a as usize] + hollows[*b as usize] - depth + soft;
-        lagrangian += load * (depth - 0.5 * soft);
-    }
-    lagrangian
 }

@@ -144,7 +144,7 @@ fn single_droplets_are_those_of_thirty_digits() {
         radii[0] = n.radius;
         let packing = Packing::new(Domain::new(20.0, 20.0).unwrap(), radii, positions).unwrap();
         let mut foam = Foam::new(Films::Straight, 1.0, 1e-12);
-        foam.set_lines(&packing);
+        foam.set_lines(&packing, f64::INFINITY);
         foam.lines.turn(&foam.tilts);
         let of = |c: usize| foam.lines.pairs()[c];
         let forces: Vec<f64> = (0..foam.lines.len())
@@ -163,11 +163,7 @@ fn single_droplets_are_those_of_thirty_digits() {
         );
         foam.state.find_midpoints(&foam.lines);
         let state = &foam.state;
-        assert!(
-            (state.corners().first().unwrap() / n.r - 1.0).abs() < 1e-14,
-            "{}",
-            n.name
-        );
+        assert!((state.corners()[0] / n.r - 1.0).abs() < 1e-14, "{}", n.name);
         assert!((state.droplets()[0].y + 1.0 - n.y).abs() < 1e-14);
         for (c, &[i, j]) in foam.lines.pairs().iter().enumerate() {
             if i == 0 {

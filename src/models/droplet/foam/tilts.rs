@@ -62,6 +62,8 @@ pub(super) struct Tilting {
     yielding: Vec<Lanes>,
     curvatures: Vec<Lanes>,
     answers: Vec<Lanes>,
+    /// By sides: `r M` (length).
+    arms: Vec<Lanes>,
 }
 
 impl Tilting {
@@ -85,34 +87,38 @@ impl Tilting {
         layout.scatter(&mut self.yielding, yields);
         self.curvatures.resize(layout.groups(), [0.0; LANES]);
         self.answers.resize(layout.groups(), [0.0; LANES]);
-        let columns = (&mut self.curvatures[..], &mut self.answers[..]);
+        self.arms.resize(layout.groups(), [0.0; LANES]);
+        let columns = [&mut self.curvatures, &mut self.answers, &mut self.arms];
+        let columns = columns.map(|column| &mut column[..]);
         find_stiffness(lines, state, &self.yielding, columns);
     }
 
     #[inline(always)]
     fn turn(&self, lines: &Lines, state: &State, tilts: &mut [f64]) {
-        let (curvatures, answers) = (&self.curvatures[..], &self.answers[..]);
-        let (curvatures, answers) = (curvatures.as_flattened(), answers.as_flattened());
-        let loads = state.loads();
-        for (c, tilt) in tilts.iter_mut().enumerate() {
-            let [a, b] = lines.sides_of(c);
+        let columns = [&self.curvatures, &self.answers, &self.arms];
+        let [curvatures, answers, arms] = columns.map(|column| column.as_flattened());
+        let (loads, sides) = (state.loads(), lines.layout().of_lines());
+        let given = sides.iter().zip(loads).zip(lines.distances());
+        let given = given.zip(lines.shorter().iter().zip(lines.across()));
+        for (tilt, (((sides, load), distance), (shorter, across))) in tilts.iter_mut().zip(given) {
+            let [a, b] = sides.map(|side| side as usize);
             let own = curvatures[a] + curvatures[b];
             let answer = answers[a] + answers[b];
-            let distance = lines.distances()[c];
-            let k = (lines.along(c) + own).max(0.4 * distance) + 1.5 * loads[c] * answer;
-            let step = (state.moment_arm(lines, c) / k).clamp(-LONGEST, LONGEST);
+            let arm = across + arms[a] + arms[b];
+            let k = ((distance - shorter) + own).max(0.4 * distance) + 1.5 * load * answer;
+            let step = (arm / k).clamp(-LONGEST, LONGEST);
             *tilt = (*tilt - step).clamp(-LARGEST, LARGEST);
         }
     }
 }
 
-/// `r D` and `r² Σ_l G²/B_ll` of all sides.
+/// `r D`, `r² Σ_l G²/B_ll` and `r M` of all sides.
 #[inline(always)]
 fn find_stiffness(
     lines: &Lines,
     state: &State,
     yielding: &[Lanes],
-    (curvatures, answers): (&mut [Lanes], &mut [Lanes]),
+    [curvatures, answers, arms]: [&mut [Lanes]; 3],
 ) {
     let ([x, y], slopes) = (lines.outward(), lines.slopes());
     let (pushes, kernel) = (state.pushes(), state.kernel_sums());
@@ -147,7 +153,7 @@ fn find_stiffness(
         for g in groups {
             let (f, kernel, x, y) = (&pushes[g], &kernel[g], &x[g], &y[g]);
             let mut answer = answers[g];
-            let mut curvature = [0.0; LANES];
+            let (mut curvature, mut arm) = ([0.0; LANES], state.midpoints()[g]);
             for k in 0..LANES {
                 let along = net_x * x[k] + net_y * y[k];
                 curvature[k] = r
@@ -155,8 +161,24 @@ fn find_stiffness(
                         - 0.5 / PI * (droplet.force - f[k])
                         - 1.0 / PI * (along - f[k]));
                 answer[k] *= r * r;
+                arm[k] *= r;
             }
-            (curvatures[g], answers[g]) = (curvature, answer);
+            (curvatures[g], answers[g], arms[g]) = (curvature, answer, arm);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_turns_are_right_to_the_last_bit_or_its_neighbour() {
+        for k in -4000..=4000 {
+            let tilt = LARGEST * f64::from(k) / 4000.0;
+            let ((sin, cos), (s, c)) = (half_turn(tilt), libm::sincos(0.5 * tilt));
+            assert!((sin - s).abs() <= f64::EPSILON * s.abs(), "{tilt}");
+            assert!((cos - c).abs() <= f64::EPSILON, "{tilt}");
         }
     }
 }
