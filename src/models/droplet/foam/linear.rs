@@ -17,8 +17,8 @@
 //! others, indefinite: it is solved by GMRES, scaled by its diagonal.
 
 use super::Foam;
-use super::contact_problem::diagonal;
-use super::lines::Side;
+use super::compliance::Compliance;
+use super::sides::Side;
 use crate::domain::Vec2;
 use crate::models::droplet::linear::Linearised;
 use crate::models::droplet::tangent;
@@ -75,6 +75,8 @@ impl Linear {
     /// The problem at the state of `foam`, with those of its contacts whose numbers, ascending, are in `kept`.
     pub(crate) fn set(&mut self, foam: &Foam, kept: &[usize]) -> bool {
         let (lines, state) = (&foam.lines, &foam.state);
+        let mut given = Compliance::default();
+        given.find(lines, state);
         self.line_tension = foam.line_tension;
         let mut place = vec![u32::MAX; lines.len()];
         let bearing = (0..lines.len()).filter(|c| state.loads()[*c] > 0.0);
@@ -91,7 +93,7 @@ impl Linear {
             place[c] = number;
             let load = state.loads()[c];
             let (root, film) = (load.sqrt(), state.film(c));
-            let compliance = diagonal(lines, state, c);
+            let compliance = given.diagonal()[c];
             let normal = lines.normals()[c];
             let [_, coupling, _] = film.second();
             let arm = state.moment_arm(lines, c);
@@ -99,7 +101,7 @@ impl Linear {
                 pair: lines.pairs()[c].map(|p| p as usize),
                 normal,
                 across: tangent(normal) * root,
-                turn: lines.along(c),
+                turn: lines.distances()[c] - lines.shorter()[c],
                 arm: arm / root,
                 give: -film.softness() - state.give(),
                 coupling,
@@ -113,7 +115,7 @@ impl Linear {
             .resize(2 * kept.len() + state.corners().len(), 0.0);
         self.stiffness.clear();
         (self.stiffness).extend(state.droplets().iter().map(|droplet| droplet.stiffness));
-        self.set_sides(foam, &place);
+        self.set_sides(foam, &place, given.weights().as_flattened());
         self.factorize()
     }
 
@@ -172,7 +174,7 @@ impl Linear {
     }
 
     /// The sides that bear the kept contacts, and their blocks. Row `k` of a droplet holds what its side `k` has to do with each.
-    fn set_sides(&mut self, foam: &Foam, place: &[u32]) {
+    fn set_sides(&mut self, foam: &Foam, place: &[u32], weights: &[f64]) {
         let (lines, state) = (&foam.lines, &foam.state);
         self.first.clear();
         self.sides.clear();
@@ -197,14 +199,14 @@ impl Linear {
                 let line = sides[k].line as usize;
                 let end = usize::from(sides[k].is_second);
                 let contact = place[line];
-                let (f, of_side) = (load(k), state.sides()[lines.first_side(p) + k]);
+                let (f, of_side) = (load(k), state.side(lines.sides_of(line)[end]));
                 let root = f.sqrt();
                 let curvature = (of_side.k - 3.0 * f / (4.0 * PI))
                     - (of_droplet.force - f) / (2.0 * PI)
                     - (net.dot(&outward(k)) - f) / PI;
                 self.contacts[contact as usize].turn += r * curvature;
                 self.by_radius
-                    .push([state.weights(lines, line)[end], root * of_side.m]);
+                    .push([weights[lines.sides_of(line)[end]], root * of_side.m]);
                 self.sides.push(Side {
                     line: contact,
                     is_second: sides[k].is_second,

@@ -261,10 +261,6 @@ impl Lines {
     }
 
     /// `Â` and `G` between side `k` of droplet `p`, counted from its first, and each of its sides.
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "for derivatives by tilts and positions")
-    )]
     pub fn rows(&self, p: usize, k: usize) -> (&[f64], &[f64]) {
         let place = self.place(p);
         let first = place.rows().start + k * place.width();

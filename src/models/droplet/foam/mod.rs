@@ -37,8 +37,8 @@ mod contact_problem;
 mod correction;
 mod coupling;
 mod film;
-pub(crate) mod linear;
 mod gaps;
+pub(crate) mod linear;
 mod lines;
 mod model;
 mod outline;
@@ -63,7 +63,7 @@ use contact_problem::Steps;
 use linear::Linear;
 use lines::{Lines, REACH};
 use state::State;
-use tilts::Tilting;
+use tilts::{LARGEST, Tilting};
 
 /// How soft contacts are made where droplets have no room (largest radii a γ), how often that is doubled, and the `f_max` (units of γ) below which
 /// they are made hard again.
@@ -313,7 +313,7 @@ impl Foam {
     ) -> Result<(), ContactError> {
         let before = self.lines.clone();
         let mut turned = self.tilts.clone();
-        tilts::step(&self.lines, &self.state, &mut self.tilts);
+        self.tilting.step(&self.lines, &self.state, &mut self.tilts);
         let bearing = self.forces.iter().enumerate().filter(|(_, f)| **f > 0.0);
         let bearing: Vec<usize> = bearing.map(|(c, _)| c).collect();
         for (number, &c) in bearing.iter().enumerate() {
@@ -329,12 +329,13 @@ impl Foam {
             .zip(linear.change_of_radii(change));
         let dents: Vec<f64> = dents.map(|(d, r)| d - part * r).collect();
         self.state.set_dents(&dents);
-        self.set_lines(packing);
+        self.set_lines(packing, f64::INFINITY);
         for c in bearing {
             // The normal is what was changed: the tilt is what it has beside the line of centres.
             if let Ok(now) = self.lines.pairs().binary_search(&before.pairs()[c]) {
                 let (old, new) = (before.between(c), self.lines.between(now));
-                self.tilts[now] = turned[c] - libm::atan2(old.perp(&new), old.dot(&new));
+                let tilt = turned[c] - libm::atan2(old.perp(&new), old.dot(&new));
+                self.tilts[now] = tilt.clamp(-LARGEST, LARGEST);
             }
         }
         let tolerance = self.due(packing, 0.0);

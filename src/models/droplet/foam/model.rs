@@ -87,7 +87,6 @@ impl Model for Foam {
             });
         }
         self.state.find_midpoints(&self.lines);
-        self.state.find_midpoints(&self.lines);
         self.balance(packing);
         Ok(())
     }

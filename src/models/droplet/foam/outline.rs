@@ -8,7 +8,7 @@
 use super::super::arc::{Arc, FilmArc};
 use super::super::kernel::Direction;
 use super::super::outline::{Extent, Stretch};
-use super::lines::Side;
+use super::sides::Side;
 use super::{Films, Foam};
 use crate::domain::Vec2;
 use core::f64::consts::PI;

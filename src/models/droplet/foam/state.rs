@@ -49,10 +49,6 @@ const STEP: f64 = 0.3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OfSide {
     /// `K` and `M` (dimensionless).
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "for derivatives by tilts and positions")
-    )]
     pub k: f64,
     pub m: f64,
 }
