@@ -42,6 +42,12 @@ impl Progress {
         }
     }
 
+    /// The same way in a run of another model, of which a search knows nothing.
+    pub fn forgotten(self) -> Self {
+        let known = Vec::new();
+        Self { known, ..self }
+    }
+
     /// As a frame has them.
     pub fn values(&self) -> Vec<f64> {
         let [x, y] = self.sides;
@@ -67,7 +73,7 @@ impl Progress {
             Act::Compress {
                 until: Until::Pressure(_),
                 ..
-            } => &[0, 4],
+            } => &[0, 5],
             Act::Jam { .. } => &[0, 6, 6 + 2 * particles],
             Act::Relax | Act::Compress { .. } | Act::Shear { .. } => &[0],
         };
@@ -98,6 +104,8 @@ pub(crate) enum Next {
     Strained(Box<Packing>, Progress),
     /// The stage is at its end.
     Over,
+    /// The stage cannot come to its end, and why.
+    Impossible(&'static str),
 }
 
 /// Below this pressure, times the smallest diameter over γ, a packing bears none, if its `f_max` is 1e-11 or less; a search by bisection asks for a
@@ -118,8 +126,17 @@ const MET: f64 = 1e-6;
 /// The slopes of the last two pairs of states agree to this where no particles have rearranged.
 const AGREES: f64 = 0.02;
 
-/// Most steps of a search.
+/// A step of a search that leaves less than this part of the pressure has lost the network.
+const LOST: f64 = 0.01;
+
+/// A network that breaks under a pressure is followed to so near before it breaks, in units of the pressure at which a search ends (coverage).
+const NEAREST: f64 = 1e-3;
+
+/// Most steps of a search, of a compression to a pressure between the two states on either side of it.
 const LONGEST: u64 = 300;
+
+/// Coverages beyond which nothing is compressed.
+const DENSEST: f64 = 1.3;
 
 /// What `act` does with a relaxed packing under this pressure (γ/length).
 pub(crate) fn next(act: Act, progress: &Progress, packing: &Packing, pressure: f64) -> Next {
@@ -192,7 +209,7 @@ fn compressed(progress: &Progress, packing: &Packing, phi: f64, known: Vec<f64>)
     })
 }
 
-/// The packing in another box, each particle moved as `affine` says by the ratios of the sides; a box that is none ends the stage.
+/// The packing in another box, each particle moved as `affine` says by the ratios of the sides.
 fn strained(
     packing: &Packing,
     domain: Option<Domain>,
@@ -200,7 +217,7 @@ fn strained(
     affine: impl Fn(&Vec2, [f64; 2]) -> Vec2,
 ) -> Next {
     let Some(domain) = domain else {
-        return Next::Over;
+        return Next::Impossible(NO_BOX);
     };
     let (new, old) = (domain.lengths(), packing.domain().lengths());
     let ratios = [new.x / old.x, new.y / old.y];
@@ -208,9 +225,11 @@ fn strained(
     let positions = positions.map(|x| domain.wrap(affine(x, ratios))).collect();
     match Packing::new(domain, packing.radii().to_vec(), positions) {
         Ok(packing) => Next::Strained(Box::new(packing), progress),
-        Err(_) => Next::Over,
+        Err(_) => Next::Impossible(NO_BOX),
     }
 }
+
+const NO_BOX: &str = "its next box would have a side that is none; let it end before";
 
 /// The strain of step `k` of a shear by `strain` and back and forth; `None` behind its end.
 fn path(k: u64, strain: f64, step: f64, cycles: u32) -> Option<f64> {
@@ -264,18 +283,19 @@ fn to_pressure(
     by: Increment,
 ) -> Next {
     let phi = packing.coverage();
-    if (pressure - end).abs() <= MET * end || progress.count >= LONGEST {
+    if (pressure - end).abs() <= MET * end {
         return Next::Over;
     }
-    // Coverage and pressure of the last state below and the last one above; a pressure of −1 if there is none.
+    // Coverage and pressure of the last state below and the last one above, a pressure of −1 if there is none, and the steps before there were both.
     let mut known = match progress.known[..] {
-        [a, b, c, d] => [a, b, c, d],
-        _ => [0.0, -1.0, 0.0, -1.0],
+        [a, b, c, d, e] => [a, b, c, d, e],
+        _ => [0.0, -1.0, 0.0, -1.0, 0.0],
     };
     let side = if pressure < end { 0 } else { 2 };
     (known[side], known[side + 1]) = (phi, pressure);
-    let [low, below, high, above] = known;
+    let [low, below, high, above, before] = known;
     let then = if below < 0.0 || above < 0.0 {
+        known[4] = progress.count as f64;
         let step = match by {
             Increment::Absolute(step) => step,
             Increment::Relative(step) => step * phi,
@@ -289,8 +309,13 @@ fn to_pressure(
         let part = ((end - below) / (above - below)).clamp(0.02, 0.98);
         low + (high - low) * part
     };
-    if then == phi {
-        return Next::Over;
+    if then == phi || progress.count as f64 - before >= LONGEST as f64 {
+        return Next::Impossible(
+            "no relaxed state that it comes to has this pressure: particles rearrange there",
+        );
+    }
+    if then <= 0.0 || then >= DENSEST {
+        return Next::Impossible("its pressure is not met at any coverage below 1.3");
     }
     compressed(progress, packing, then, known.to_vec())
 }
@@ -376,10 +401,14 @@ impl Search {
 fn halve(progress: &Progress, packing: &Packing, pressure: f64, end: f64) -> Next {
     let phi = packing.coverage();
     let mut search = Search::of(progress, 0.5);
-    if progress.count >= LONGEST {
+    let diameter = 2.0 * packing.smallest_radius();
+    let bears = pressure * diameter > NO_PRESSURE && pressure > LOST * search.pressure;
+    if bears && search.step == 0.0 {
         return Next::Over;
     }
-    let bears = pressure * 2.0 * packing.smallest_radius() > NO_PRESSURE;
+    if progress.count >= LONGEST {
+        return Next::Impossible(TOO_LONG);
+    }
     if bears {
         search.arrive(phi, pressure);
         if is_extrapolated(&search, end) {
@@ -394,12 +423,18 @@ fn halve(progress: &Progress, packing: &Packing, pressure: f64, end: f64) -> Nex
     }
     search.step *= 0.5;
     search.failed += 1.0;
-    let then = search.phi - search.step * search.pressure / search.slope.max(LEAST_SLOPE);
+    let mut back = search.step * search.pressure / search.slope.max(LEAST_SLOPE);
+    if back < NEAREST * end {
+        // The network breaks under a pressure: the search ends with the last state before.
+        (search.step, back) = (0.0, 0.0);
+    }
     match search.kept(progress, packing) {
-        Some(kept) if then < search.phi => search.from(progress, &kept, then),
-        _ => Next::Over,
+        Some(kept) => search.from(progress, &kept, search.phi - back),
+        None => Next::Impossible(NO_BOX),
     }
 }
+
+const TOO_LONG: &str = "no φ_J within 300 relaxed states; let it start nearer to it";
 
 /// Whether a line through the last two states leads to φ_J.
 fn is_extrapolated(search: &Search, end: f64) -> bool {
@@ -412,7 +447,7 @@ fn bisect(progress: &Progress, packing: &Packing, pressure: f64, (way, end): (Wa
     let phi = packing.coverage();
     let mut search = Search::of(progress, SEARCH);
     if progress.count >= LONGEST {
-        return Next::Over;
+        return Next::Impossible(TOO_LONG);
     }
     let bears = pressure * 2.0 * packing.smallest_radius() > 0.1 * end;
     let stays = bears == (way == Way::Above);
@@ -438,7 +473,7 @@ fn bisect(progress: &Progress, packing: &Packing, pressure: f64, (way, end): (Wa
     };
     match search.kept(progress, packing) {
         Some(kept) => search.from(progress, &kept, then),
-        None => Next::Over,
+        None => Next::Impossible(NO_BOX),
     }
 }
 
@@ -459,7 +494,8 @@ fn bisect(progress: &Progress, packing: &Packing, pressure: f64, (way, end): (Wa
 pub struct Jamming {
     /// φ_J.
     pub phi_j: f64,
-    /// The slope `dp/dφ` there (γ/length), by the last two jammed states; `None` of a bisection.
+    /// The slope `dp/dφ` there (γ/length), by the last two jammed states; `None` of a bisection, and where the network breaks at a pressure
+    /// above the `end` of the search: φ_J is where it does then.
     pub slope: Option<f64>,
     /// How many steps went too far and were taken back.
     pub failed: u64,
@@ -511,6 +547,7 @@ pub(crate) fn jamming(
     let phi = packing.coverage();
     let mut search = Search::of(progress, 0.5);
     let (phi_j, slope) = match way {
+        Way::Halving if search.step == 0.0 => (phi, None),
         Way::Halving => {
             search.arrive(phi, pressure);
             (phi - pressure / search.slope, Some(search.slope))

@@ -187,9 +187,7 @@ impl Relaxation {
             Some(stage) => Progress::from_values(&frame.protocol, stage.act, packing.len()),
             None => Some(Progress::default()),
         };
-        let progress = progress.ok_or(FrameError::Foreign {
-            what: "numbers of a protocol that are not its stage's",
-        })?;
+        let progress = progress.ok_or(NOT_ITS_NUMBERS)?;
         let moving = (frame.step, frame.velocities, mover);
         let run = Self::at(scene, packing, model, moving);
         Ok(Self {
@@ -218,6 +216,15 @@ impl Relaxation {
                     return self.strain(stage, *packing, progress);
                 }
                 Some((stage, Next::Over)) => self.enter(stage),
+                Some((stage, Next::Impossible(why))) => {
+                    self.failed = true;
+                    let act = self.scene.stage_of_protocol(stage).map(|s| s.act.name());
+                    return Err(RelaxError::Protocol {
+                        step: self.step,
+                        act: act.unwrap_or_default(),
+                        why,
+                    });
+                }
                 None => {}
             }
         }
@@ -387,6 +394,10 @@ impl Iterator for Relaxation {
         Some(Ok(self.frame()))
     }
 }
+
+const NOT_ITS_NUMBERS: FrameError = FrameError::Foreign {
+    what: "numbers of a protocol that are not its stage's",
+};
 
 /// Whether the scene's minimiser ends with Newton's method.
 fn finishes(scene: &Scene) -> bool {

@@ -61,6 +61,16 @@ pub enum RelaxError {
         /// The bound of the time step in use.
         dt_max: f64,
     },
+    /// A stage of the protocol cannot come to its end.
+    #[error("step {step}: \"{act}\" cannot come to its end: {why}")]
+    Protocol {
+        /// The step of the last relaxed state.
+        step: u64,
+        /// What the stage does.
+        act: &'static str,
+        /// Why it cannot.
+        why: &'static str,
+    },
     /// The frame to go on from does not belong to the scene.
     #[error("the frame does not belong to this scene: {0}")]
     Frame(#[from] FrameError),

@@ -25,7 +25,7 @@ impl Relaxation {
             if let Some(found) = self.scene.stage_of_protocol(stage) {
                 let further = stage != self.stage && !self.is_balanced_to(found.threshold);
                 let next = drive::next(found.act, &progress, &self.packing, pressure);
-                if further || matches!(next, Next::Strained(..)) {
+                if further || !matches!(next, Next::Over) {
                     return Some((stage, if further { Next::Over } else { next }));
                 }
             }
@@ -37,13 +37,15 @@ impl Relaxation {
         }
     }
 
-    /// What a search of φ_J, which is the stage of this frame, has come to; `None` in other stages and before its state is relaxed.
+    /// What a search of φ_J, which is the stage of this frame, has come to; `None` in other stages and before its end.
     #[must_use]
     pub fn jamming(&self) -> Option<Jamming> {
         let stage = self.scene.stage_of_protocol(self.stage)?;
         let found = || {
             let pressure = self.observables().pressure();
-            drive::jamming(stage.act, &self.progress, &self.packing, pressure)
+            let next = drive::next(stage.act, &self.progress, &self.packing, pressure);
+            matches!(next, Next::Over)
+                .then(|| drive::jamming(stage.act, &self.progress, &self.packing, pressure))?
         };
         self.is_balanced().then(found)?
     }

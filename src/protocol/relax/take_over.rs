@@ -1,6 +1,7 @@
 //! A run that goes on under another scene.
 
-use super::{RelaxError, Relaxation};
+use super::super::drive::Progress;
+use super::{NOT_ITS_NUMBERS, RelaxError, Relaxation};
 use crate::minimize::dt_and_time;
 use crate::models::{Goal, Model};
 use crate::scene::Scene;
@@ -43,9 +44,22 @@ impl Relaxation {
             frame.validate(packing.len(), packing.domain())?;
             let (_, time) = dt_and_time(&frame.minimizer);
             *packing.positions_mut() = core::mem::take(&mut frame.positions);
+            before.admits(&frame)?;
+            let progress = match scene.stage_of_protocol(frame.stage) {
+                Some(stage) => Progress::from_values(&frame.protocol, stage.act, packing.len()),
+                None => Some(Progress::default()),
+            };
+            let progress = progress.ok_or(NOT_ITS_NUMBERS)?;
+            if let Some(domain) = frame.domain {
+                packing.set_domain(domain);
+            }
             let run = Self::begin(&stages[1], packing, (step, time))?;
+            let limit = progress.began.saturating_add(run.step_limit);
             return Ok(Self {
+                scene: Box::new(scene.clone()),
                 stage: frame.stage,
+                step_limit: limit,
+                progress: progress.forgotten(),
                 ..run
             });
         }
