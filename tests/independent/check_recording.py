@@ -6,7 +6,7 @@ For every recorded state (or every K-th, with --every K):
                  of droplets that keep their area the gaps of contacts and the areas (foam_law.py)
   contact law    f > 0 on contacts, gap >= 0 for all other pairs
   balance        the largest net force, against the recorded f_max
-  pressure, U, Z from forces and distances, against the recorded metrics
+  pressure, U, Z from forces and distances, against the recorded metrics; stress, coverage and strain in a box that a protocol changes
   contours       every vertex against rho_i(theta) at its own angle; of droplets that keep their area against their arcs, and
                  what these enclose and how long they are against pi R^2 and U, as far as f_max lets them close
   left out       how far the latest contours and contacts are from a state that has none of its own
@@ -25,7 +25,9 @@ import tomllib
 import numpy as np
 import rerun.experimental as rerun
 
-from foam_law import ARCS, Droplets, dg, g
+from foam_law import ARCS, Droplets, dg, g, nearest
+
+STRESS = ("stress_xy", "stress_xx", "stress_yy")
 
 # What stands beside the contours and the contacts, by entity.
 BESIDE = {
@@ -40,6 +42,7 @@ BESIDE = {
 class Recording:
     def __init__(self, path):
         self.states, self.contours, self.metrics, self.stages, self.memory = {}, {}, {}, {}, {}
+        self.boxes, self.protocols = {}, {}
         self.beside = {entity: {} for entity in BESIDE}
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch = chunk.to_record_batch()
@@ -51,8 +54,9 @@ class Recording:
                 model = scene.get("model", "morse-witten")
                 self.model_is_disks, self.keeps_area = model == "disks", model in ("rounded-polygon", "wet-foam")
                 self.arcs = model == "wet-foam"
+                self.protocol = scene.get("protocol", [])
                 self.records_disks = scene.get("disks", {}).get("record", "off") != "off"
-                self.threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
+                self.first_threshold, self.tolerance = scene["threshold"], scene.get("contact_tolerance", 0.0)
                 self.seed_rule = scene.get("contact_rule") in ("saitoh", "seed")
                 self.channels = scene["channels"]
             if entity in BESIDE and not chunk.is_static:
@@ -60,13 +64,17 @@ class Recording:
                 self.beside[entity] |= dict(zip(batch["step"].to_pylist(), zip(*columns)))
             if entity == "/particles":
                 self.radii = batch["softjam.Particles:radius"][0].values.to_numpy()
-                self.box = batch["softjam.Particles:box"][0].values.to_numpy()
+                self.box = self.first_box = batch["softjam.Particles:box"][0].values.to_numpy()
             elif entity == "/state":
                 for row in range(batch.num_rows):
                     self.states[batch["step"][row].as_py()] = tuple(
                         flat(batch["softjam.State:" + name][row])
                         for name in ("position", "contact", "force")
                     )
+                    for name, found in (("box", self.boxes), ("protocol", self.protocols)):
+                        name = "softjam.State:" + name
+                        if name in batch.schema.names and batch[name][row].is_valid:
+                            found[batch["step"][row].as_py()] = flat(batch[name][row]).copy()
                     if "softjam.State:memory" in batch.schema.names and batch["softjam.State:memory"][row].is_valid:
                         self.memory[batch["step"][row].as_py()] = flat(batch["softjam.State:memory"][row]).copy()
                     if "softjam.State:stage" in batch.schema.names and (stage := batch["softjam.State:stage"][row]).is_valid:
@@ -79,6 +87,16 @@ class Recording:
                 values = self.metrics.setdefault(entity.removeprefix("/metrics/"), {})
                 for row in range(batch.num_rows):
                     values[batch["step"][row].as_py()] = batch["Scalars:scalars"][row][0].as_py()
+
+    def at(self, step):
+        """Takes the box and the threshold of a step; its state, with every particle where it is drawn: between the slanted sides."""
+        box = self.boxes.get(step, ())
+        self.box = box if len(box) else self.first_box
+        stage = self.stages.get(step, 0) - self.records_disks
+        self.threshold = self.protocol[stage - 1]["threshold"] if stage > 0 else self.first_threshold
+        positions, contacts, forces = self.states[step]
+        x = positions[:, 0] - self.box[0] * np.floor(straightened(positions, self.box)[:, 0] / self.box[0])
+        return np.stack([x, positions[:, 1]], axis=1), contacts, forces
 
     def disks(self, step):
         """Whether the particles are undeformed disks: all along, or in the first stage of a run that records them."""
@@ -93,8 +111,9 @@ def flat(cell):
     return values.to_numpy()
 
 
-def nearest(d, box):
-    return d - box * np.rint(d / box)
+def straightened(points, box):
+    """Where points of the sheared box are in the upright one."""
+    return np.stack([points[:, 0] - sum(box[2:]) * (points[:, 1] / box[1]), points[:, 1]], axis=1)
 
 
 def check_state(recording, state, gamma, disks):
@@ -144,7 +163,7 @@ def check_state(recording, state, gamma, disks):
     net = np.zeros((n, 2))
     np.add.at(net, i, forces[:, None] * normal)
     np.add.at(net, j, -forces[:, None] * normal)
-    twist = 0.0
+    area, twist, turn = box[0] * box[1], 0.0, 0.0
     if recording.gradient:
         # -dU/dr = f n + (tau / r) t, tau_c = -f_c sum R_p/(2 pi gamma) g'(angle of c less that of k) f_k.
         torque = np.zeros(len(forces))
@@ -156,15 +175,18 @@ def check_state(recording, state, gamma, disks):
         push = (torque / r)[:, None] * np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         np.add.at(net, i, push)
         np.add.at(net, j, -push)
-        twist = 0.5 * (torque * (normal[:, 0] ** 2 - normal[:, 1] ** 2)).sum() / box.prod()
+        twist = 0.5 * (torque * (normal[:, 0] ** 2 - normal[:, 1] ** 2)).sum() / area
+        turn = (torque * normal[:, 0] * normal[:, 1]).sum() / area
     return {
         "eq4": residual,
         "gap": least_gap / scale,
         "force": forces.min() if len(forces) else np.inf,
         "f_max": np.hypot(net[:, 0], net[:, 1]).max(),
-        "pressure": (forces * r).sum() / (2 * box.prod()),
+        "pressure": (forces * r).sum() / (2 * area),
         "energy": 0.5 * (forces * delta).sum(),
-        "stress_xy": -(forces * r * normal[:, 0] * normal[:, 1]).sum() / box.prod() - twist,
+        "stress_xy": -(forces * r * normal[:, 0] * normal[:, 1]).sum() / area - twist,
+        "stress_xx": -(forces * r * normal[:, 0] ** 2).sum() / area + turn,
+        "stress_yy": -(forces * r * normal[:, 1] ** 2).sum() / area - turn,
         "around": around,
         "scale": scale,
     }
@@ -176,7 +198,7 @@ def check_foam(recording, step, state, gamma):
     memory = recording.memory[step]
     droplets = Droplets(positions, recording.radii, recording.box, contacts, forces / gamma, memory, recording.arcs)
     found = droplets.residuals(lambda f_max, scale: promised(recording, f_max, scale, False) * scale)
-    of_forces = {name: gamma * found[name] for name in ("f_max", "pressure", "stress_xy", "energy", "moment")}
+    of_forces = {name: gamma * found[name] for name in ("f_max", "pressure", *STRESS, "energy", "moment")}
     return found | of_forces | {"force": forces.min(initial=np.inf), "droplets": droplets}
 
 
@@ -217,11 +239,12 @@ def periods(points, box, single):
     certain, possible = set(), set()
     for x in (-1, 0, 1):
         for y in (-1, 0, 1):
-            v = points + np.array([x, y]) * box
+            v = straightened(points + np.array([x * box[0] + y * sum(box[2:]), y * box[1]]), box)
             if x or y:
-                if ((v > single) & (v < box - single)).all(axis=1).any():
+                sides = box[:2]
+                if ((v > single) & (v < sides - single)).all(axis=1).any():
                     certain.add((x, y))
-                if ((v > -single) & (v < box + single)).all(axis=1).any():
+                if ((v > -single) & (v < sides + single)).all(axis=1).any():
                     possible.add((x, y))
     return certain, possible
 
@@ -232,8 +255,9 @@ def images(whole, cell, box, single, dense):
     found = [set() for _ in whole]
     for number, strip in zip(numbers, strips):
         moved = np.asarray(strip) - whole[number]
-        shift = np.rint(moved[0] / box)
-        if np.abs(moved - shift * box).max() > 2 * single:
+        rows = np.rint(moved[0, 1] / box[1])
+        shift = np.array([np.rint((moved[0, 0] - rows * sum(box[2:])) / box[0]), rows])
+        if np.abs(moved - [shift[0] * box[0] + rows * sum(box[2:]), rows * box[1]]).max() > 2 * single:
             sys.exit(f"an image of {number} is not it, moved by a period")
         if tuple(shift) in found[number]:
             sys.exit(f"an image of {number} is there twice")
@@ -324,6 +348,8 @@ def check_left_out(recording, step, state, gamma):
         # States may be thinned more than pictures.
         if drawn not in recording.states:
             continue
+        if not np.array_equal(recording.boxes.get(drawn, ()), recording.boxes.get(step, ())):
+            continue
         before, pairs, loads = recording.states[drawn]
         moved = np.linalg.norm(nearest(positions - before, recording.box), axis=1)
         worst = max(worst, moved.max() / (redraw * recording.radii.mean()))
@@ -343,6 +369,18 @@ def check_left_out(recording, step, state, gamma):
     return worst
 
 
+def off_strain(recording, step):
+    """How far coverage and strain are from the recorded ones; the box knows its strain where it is sheared alone, but for whole turns."""
+    box, recorded = recording.box, recording.metrics["strain"][step]
+    off = abs(np.pi * (recording.radii**2).sum() / (box[0] * box[1]) - recording.metrics["phi"][step])
+    if step in recording.protocols and len(recording.protocols[step]):
+        off = max(off, abs(recording.protocols[step][0] - recorded))
+    if all(stage["act"] != "shear" or stage.get("mode", "simple") == "simple" for stage in recording.protocol):
+        turns = (recorded * box[1] - sum(box[2:])) / box[0]
+        off = max(off, abs(turns - np.rint(turns)))
+    return off
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("path")
@@ -353,13 +391,16 @@ def main():
     gamma = recording.line_tension
     steps = sorted(recording.states)
     steps = sorted(set(steps[:: arguments.every]) | {steps[-1]})
-    checks = "eq4 gap force f_max moment pressure energy stress_xy coordination closed enclosed length contour beside left"
+    checks = "eq4 gap force f_max moment pressure energy stress strain coordination closed enclosed length contour beside left"
     worst = dict.fromkeys(checks.split(), 0.0)
     vertices, count, latest = 0, 0, 0
     # A vertex is a pair of f32 as large as the box: half a unit in the last place of each coordinate.
-    single = float(np.finfo(np.float32).eps) * float(recording.box.max() + 2 * recording.radii.max())
+    sides = [box[:2].max() for box in (recording.first_box, *recording.boxes.values()) if len(box)]
+    # A leaning box is drawn up to half a side beyond its upright one.
+    lean = 1.5 if recording.boxes else 1.0
+    single = float(np.finfo(np.float32).eps) * float(lean * max(sides) + 2 * recording.radii.max())
     for step in steps:
-        state = recording.states[step]
+        state = recording.at(step)
         disks = recording.disks(step)
         if arguments.perturb == "force":
             state = *state[:2], state[2] * (1 + 1e-6 * (np.arange(len(state[2])) == 0))
@@ -373,9 +414,13 @@ def main():
         worst["force"] = np.maximum(worst["force"], -found["force"])
         for name in ("closed", "enclosed", "length"):
             worst[name] = np.maximum(worst[name], found.get(name, 0.0))
-        for name in ("f_max", "pressure", "energy", "stress_xy") + ("moment",) * foam:
+        for name in ("f_max", "pressure", "energy") + ("moment",) * foam:
             recorded = recording.metrics[name][step]
             worst[name] = np.maximum(worst[name], abs(found[name] / gamma - recorded))
+        for name in STRESS if recording.protocol else STRESS[:1]:
+            worst["stress"] = np.maximum(worst["stress"], abs(found[name] / gamma - recording.metrics[name][step]))
+        if recording.protocol:
+            worst["strain"] = np.maximum(worst["strain"], off_strain(recording, step))
         recorded = recording.metrics["coordination"][step]
         worst["coordination"] = np.maximum(worst["coordination"], abs(coordination(len(recording.radii), state[1]) - recorded))
         if step in recording.contours:
@@ -398,7 +443,8 @@ def main():
         "f_max": (1e-9, "net force against the recorded f_max"),
         "pressure": (1e-9, "pressure against the recorded one"),
         "energy": (1e-9, "energy against the recorded one"),
-        "stress_xy": (1e-9, "shear stress against the recorded one"),
+        "stress": (1e-9, "stress against the recorded one"),
+        "strain": (1e-11, "coverage and strain of the box against the recorded ones"),
         "coordination": (1e-12, "Z against the recorded one"),
         "contour": (single, f"contour vertex off its contour, {vertices} vertices"),
         "beside": (2e-7, f"numbers of particles and contacts, beside {count} periodic images"),

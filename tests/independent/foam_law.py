@@ -30,6 +30,13 @@ def dg(theta):
     return np.where(np.minimum(t, 2 * np.pi - t) < 1e-12, 0.0, (np.pi - t) * np.cos(t) - 0.5 * np.sin(t))
 
 
+def nearest(d, box):
+    """The nearest image of a difference in a box of sides `box[:2]`, whose upper period leans by `box[2]` where there is one."""
+    rows = np.rint(d[..., 1] / box[1])
+    x = d[..., 0] - rows * sum(box[2:])
+    return np.stack([x - box[0] * np.rint(x / box[0]), d[..., 1] - rows * box[1]], axis=-1)
+
+
 def unit(angle):
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
@@ -50,10 +57,9 @@ class Droplets:
 
     def __init__(self, positions, radii, box, contacts, forces, memory, arcs):
         self.positions, self.radii, self.arcs = positions, radii, arcs
-        self.volume, n = box.prod(), len(radii)
+        self.volume, n = box[0] * box[1], len(radii)
         i, j = np.triu_indices(n, 1)
-        between = positions[j] - positions[i]
-        between -= box * np.rint(between / box)
+        between = nearest(positions[j] - positions[i], box)
         distance, sums = np.hypot(*between.T), radii[i] + radii[j]
         near, far = distance < REACH * sums, (distance >= REACH * sums) & (distance < FAR * sums)
         self.far = i[far], j[far], between[far]
@@ -219,6 +225,8 @@ class Droplets:
             "f_max": f_max,
             "pressure": -0.5 * np.trace(stress),
             "stress_xy": stress[0, 1],
+            "stress_xx": stress[0, 0],
+            "stress_yy": stress[1, 1],
             "energy": self.energy(),
             "scale": scale,
             "moment": np.abs(force * self.arm).max(initial=0.0),
