@@ -3,6 +3,7 @@
 use super::source::{Ending, Item, Problem, Source};
 use super::{Event, ReadError, Recording};
 use crate::BITS;
+use crate::protocol::Relaxation;
 use crate::record::Outcome;
 use crate::scene::{Channels, Scene};
 use crate::state::Frame;
@@ -236,12 +237,23 @@ impl Joined {
         }
         let schedule = self.scene.stage(frame.stage).channels.state;
         let begins_stage = self.stage != Some(frame.stage);
-        if begins_stage || schedule.includes(step) {
+        if begins_stage || schedule.includes(step) || self.is_relaxed(&frame)? {
             self.hand_out(frame, items);
         } else {
             self.off_schedule = Some(frame);
         }
         Ok(())
+    }
+
+    /// Whether it is one of the states between which a protocol strains the box, which are recorded whatever the schedule.
+    fn is_relaxed(&self, frame: &Frame) -> Result<bool, ReadError> {
+        let part = self.parts.front();
+        let Some(part) = part.filter(|_| !self.scene.protocol.is_empty()) else {
+            return Ok(false);
+        };
+        let packing = part.packing(frame)?;
+        let run = Relaxation::resume(&self.scene, packing, frame.clone());
+        Ok(run.is_ok_and(|run| run.is_relaxed_state()))
     }
 
     fn hand_out(&mut self, frame: Frame, items: &mut Vec<Item>) {

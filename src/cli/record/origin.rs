@@ -120,7 +120,16 @@ impl Origin {
             .iter()
             .map(|leg| leg.of_model(recording.scene().model));
         let legs = legs.chain(changed.then_some(leg)).collect();
-        if scene.steps < frame.step {
+        let done = frame.stage.saturating_sub(u32::from(scene.records_disks()));
+        let of = |scene: &Scene| scene.protocol.get(..done as usize).map(<[_]>::to_vec);
+        if of(&scene) != of(recording.scene()) {
+            let what = format!(
+                "the protocol that its run has followed to step {}: go on without flags of another, or from a --step in front of it",
+                frame.step
+            );
+            return Err(needs("from", shown(recording.path()), what));
+        }
+        if scene.steps < frame.step && done == 0 {
             let allowed = format!("steps ≥ {}, the step that the run goes on from", frame.step);
             return Err(out_of_range("steps", scene.steps, allowed));
         }

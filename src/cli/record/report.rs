@@ -5,7 +5,7 @@ use crate::cli::output::Output;
 use softjam::analysis::Stability;
 use softjam::protocol::Relaxation;
 use softjam::record::Summary;
-use softjam::scene::{Scene, Start};
+use softjam::scene::{Act, Scene, Start, Way};
 use softjam::text::counted;
 use std::time::Duration;
 
@@ -25,7 +25,14 @@ pub(super) fn of(
         Some(end) if end.stability == Some(Stability::Saddle) => {
             format!("{end} (--minimizer fire+newton goes on from there)")
         }
-        Some(end) => end.to_string(),
+        Some(end) => match scene.stage_of_protocol(run.stage()) {
+            Some(stage) if !end.converged => format!(
+                "{end}: a state of the stage \"{}\" is not relaxed after the {} that protocol.steps allows it",
+                stage.act.name(),
+                counted(stage.steps, "step")
+            ),
+            _ => end.to_string(),
+        },
     };
     lines.line("result", result);
     let origin = match &scene.start {
@@ -60,6 +67,9 @@ pub(super) fn of(
     if let Some(jamming) = run.jamming() {
         let way = match jamming.slope {
             Some(slope) => format!("extrapolated from φ = {coverage:.8} with dp/dφ = {slope:.4}"),
+            None if is_halved(scene, run) => {
+                "there the network breaks, under that pressure".to_owned()
+            }
             None => "by bisection".to_owned(),
         };
         let (start, back) = (scene.phi, counted(jamming.failed as usize, "step"));
@@ -85,4 +95,11 @@ pub(super) fn of(
         output.tell(written, &mut lines);
     }
     lines.into_text()
+}
+
+/// Whether a search of φ_J, which is the stage of the run, halves the pressure.
+fn is_halved(scene: &Scene, run: &Relaxation) -> bool {
+    let way = Way::Halving;
+    let stage = scene.stage_of_protocol(run.stage());
+    stage.is_some_and(|stage| matches!(stage.act, Act::Jam { way: w, .. } if w == way))
 }
