@@ -1,4 +1,4 @@
-//! The library without the program: a packing compressed slowly, which no scene file can ask for.
+//! The library without the program: a packing compressed slowly, by a loop of one's own (a scene has `[[protocol]]` for it).
 //!
 //! `cargo run --release --no-default-features --example compress -- [FOLDER]` needs the physics alone. A packing is relaxed, its
 //! box made a little smaller, relaxed again, and so on. The forces are the gradient of the stored energy `U`, so that the work

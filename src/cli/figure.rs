@@ -1,18 +1,20 @@
 //! `softjam figure`: pictures for papers and talks.
 
+mod runs;
+
 use super::lines::Lines;
 use super::memory::MemoryFlag;
 use super::output::{check_absent, check_place, end_when_interrupted};
 use super::{Verdict, report, state_at};
-use softjam::budget::Budget;
-use softjam::figure::{self, CHART_WIDTH, CURVE_COLORS, ColorBy, Fall, FigureError, Shape, Style};
+use softjam::figure::{self, CHART_WIDTH, ColorBy, FigureError, Shape, Style};
 use softjam::models::Kind;
 use softjam::record::NewFile;
-use softjam::replay::{Event, Recording};
-use softjam::scene::Start;
+use softjam::replay::Recording;
 use softjam::text::shown;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// The flags that say how a packing is drawn.
+const OF_A_PACKING: [&str; 6] = ["step", "disks", "color", "range", "no_chains", "films"];
 
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag is a bool")]
@@ -25,13 +27,15 @@ Examples:
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
   softjam figure foam.rrd --films --color nothing --no-chains -o films.svg      droplets that keep their area, and the films between
   softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
+  softjam figure --stress-strain sheared.rrd -o stress.svg     of softjam record --shear 0.3
+  softjam figure --pressure-phi jam.rrd -o pressure.svg        of softjam record --jam, with its φ_J, or --compress-to 0.9
   softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
   softjam figure run.rrd --color nothing --no-chains -o figure5b.svg                       and 5(b)
 
 Exit codes: 0 drawn, 1 could not be done (a damaged file, a folder that is not there), 2 the request makes no sense (a step that is
 not recorded, a file that is in the way)")]
 pub struct Arguments {
-    /// The recording, .rrd or .mcap; with --fmax, as many as there are curves.
+    /// The recording, .rrd or .mcap; with --fmax, --stress-strain and --pressure-phi, as many as there are curves.
     #[arg(value_name = "RUN.rrd", required = true)]
     files: Vec<PathBuf>,
 
@@ -40,8 +44,19 @@ pub struct Arguments {
     output: PathBuf,
 
     /// Draw f_max (units of γ) against step instead of a packing, with the thresholds as dashed lines.
-    #[arg(long, conflicts_with_all = ["step", "disks", "color", "range", "no_chains", "films"])]
+    #[arg(long, conflicts_with_all = OF_A_PACKING)]
     fmax: bool,
+
+    /// Draw the shear stress (γ/length) of the relaxed states of a protocol against its strain: σ_xy of simple shear, σ_xx − σ_yy of pure
+    /// shear. A dot is the state before a yield event: a step that loses energy, or, with central forces, which have none to lose, one in
+    /// which the stress falls by more than 1e-4 γ a small diameter.
+    #[arg(long, conflicts_with_all = OF_A_PACKING, conflicts_with = "fmax")]
+    stress_strain: bool,
+
+    /// Draw the pressure (γ/length) of the relaxed states against their coverage, through compression and the search of φ_J; that is a
+    /// dashed line where the recording holds states.
+    #[arg(long, conflicts_with_all = OF_A_PACKING, conflicts_with_all = ["fmax", "stress_strain"])]
+    pressure_phi: bool,
 
     /// The recorded step to draw: a number or `last`.
     #[arg(long, value_name = "K", default_value = "last", value_parser = step)]
@@ -71,7 +86,7 @@ pub struct Arguments {
     films: bool,
 
     /// Width of the figure, in mm, cm, in, pt or px (96 an inch): 86mm is one column of many journals, 178mm two. Text is 8
-    /// points in narrow figures and 10 in wide ones [default: 668px, with --fmax 720px].
+    /// points in narrow figures and 10 in wide ones [default: 668px, of curves 720px].
     #[arg(long, value_name = "WIDTH", value_parser = width)]
     width: Option<f64>,
 
@@ -136,13 +151,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     end_when_interrupted()?;
     let file = NewFile::create(output, arguments.force)?;
     let budget = arguments.memory.budget();
+    let width = arguments.width.unwrap_or(CHART_WIDTH);
+    let files = arguments.files.as_slice();
     let svg = if arguments.fmax {
-        let runs = arguments.files.iter().map(|path| fall(path, budget));
-        let runs = named(runs.collect::<anyhow::Result<Vec<_>>>()?);
-        figure::relaxation_in(arguments.width.unwrap_or(CHART_WIDTH), &runs)?
+        figure::relaxation_in(width, &runs::falls(files, budget)?)?
+    } else if arguments.stress_strain {
+        figure::stress_strain(width, &runs::sheared(files, budget)?)?
+    } else if arguments.pressure_phi {
+        figure::pressure_phi(width, &runs::compressed(files, budget)?)?
     } else {
-        let [path] = arguments.files.as_slice() else {
-            let problem = "a packing is drawn of one recording; several are for --fmax";
+        let [path] = files else {
+            let problem = "a packing is drawn of one recording; several are for --fmax, --stress-strain and --pressure-phi";
             return Err(FigureError::Nothing(problem.to_owned()).into());
         };
         packing(path, arguments)?
@@ -152,71 +171,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Verdict> {
     lines.line("figure", output.display());
     report(&lines.into_text())?;
     Ok(Verdict::Good)
-}
-
-/// What tells runs apart: coverage, number of particles, seed or start file.
-type Names = [String; 3];
-
-/// Each curve is called by its coverage and by what else is not the same in all of them; samples of one coverage share
-/// a name, and with it a colour, where names could not be told apart by their colours.
-fn named(runs: Vec<(Names, Fall)>) -> Vec<Fall> {
-    let differs = |k: usize| runs.iter().any(|(names, _)| names[k] != runs[0].0[k]);
-    let all: Vec<usize> = (0..3).filter(|k| *k == 0 || differs(*k)).collect();
-    let label = |names: &Names, shown: &[usize]| {
-        let shown = shown.iter().map(|k| names[*k].as_str());
-        shown.collect::<Vec<_>>().join(", ")
-    };
-    let distinct: BTreeSet<String> = runs.iter().map(|(names, _)| label(names, &all)).collect();
-    let without_seed: Vec<usize> = all.iter().copied().filter(|k| *k != 2).collect();
-    let shown = if distinct.len() > CURVE_COLORS {
-        without_seed
-    } else {
-        all
-    };
-    let named = |(names, fall): (Names, Fall)| Fall {
-        label: label(&names, &shown),
-        ..fall
-    };
-    runs.into_iter().map(named).collect()
-}
-
-fn fall(path: &Path, budget: Budget) -> anyhow::Result<(Names, Fall)> {
-    let mut recording = Recording::open_within(path, budget)?;
-    let mut points = Vec::new();
-    for event in recording.by_ref() {
-        if let Event::Metric {
-            name: "f_max",
-            step,
-            value,
-            ..
-        } = event?
-        {
-            points.push((step, value));
-        }
-    }
-    if points.is_empty() {
-        let path = shown(recording.path());
-        let problem = format!("{path} holds no metrics; record it with --channels metrics,…");
-        return Err(FigureError::Nothing(problem).into());
-    }
-    points.sort_by_key(|p| p.0);
-    let names = [
-        format!("φ = {:.3}", recording.coverage()),
-        format!("N = {}", recording.radii().len()),
-        match &recording.scene().start {
-            Start::File { path, .. } => {
-                let name = Path::new(path).file_name().unwrap_or_default();
-                format!("from {}", shown(&name.display().to_string()))
-            }
-            Start::Random | Start::Hexagonal => format!("seed {}", recording.scene().seed),
-        },
-    ];
-    let fall = Fall {
-        label: String::new(),
-        points,
-        threshold: Some(recording.scene().threshold),
-    };
-    Ok((names, fall))
 }
 
 fn packing(path: &Path, arguments: &Arguments) -> anyhow::Result<String> {

@@ -3,7 +3,7 @@
 use super::axis::{Axis, Ruler};
 use super::keys::{self, COLORS, Key, keys, legend};
 use super::shapes::{CHARACTER, frame, hundredths, line, page, paper, rectangle, text};
-use super::{FigureError, INK, font_size, with_f_max};
+use super::{FigureError, INK, font_size, with_indices};
 use svg::Node as _;
 use svg::node::element::{Group, Polyline, Text};
 
@@ -135,7 +135,7 @@ pub fn chart_in(width: f64, x: &Axis, y: &Axis, curves: &[Curve]) -> Result<Stri
         .add(sheet.curves(curves, &keys))
         .add(legend(&keys, font, corner))
         .to_string();
-    Ok(with_f_max(&svg, 1.1 * font))
+    Ok(with_indices(&svg, 1.1 * font))
 }
 
 /// The frame that curves are drawn in.

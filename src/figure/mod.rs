@@ -1,4 +1,5 @@
-//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`, curves of what you like.
+//! Figures for papers and talks: a packing with its force chains, the fall of `f_max`, stress against strain and pressure against coverage,
+//! curves of what you like.
 //!
 //! A figure is SVG text; [`write()`] makes a PDF or a PNG of it where the file's name asks for one, with a font of its own, so
 //! that a picture is the same on every machine. A length of 96 in the SVG is an inch on paper.
@@ -18,6 +19,7 @@
 mod axis;
 mod bar;
 mod chart;
+mod course;
 mod films;
 mod keys;
 mod legend;
@@ -30,6 +32,7 @@ mod sheet;
 
 pub use axis::{Axis, Scale};
 pub use chart::{CHART_WIDTH, CURVE_COLORS, Curve, Mark, chart, chart_in};
+pub use course::{Course, RelaxedState, pressure_phi, stress_strain};
 pub use packing::{ColorBy, Shape, Style, packing};
 pub use relaxation::{Fall, relaxation, relaxation_in};
 
@@ -282,17 +285,29 @@ fn font_size(width: f64) -> f64 {
     (width / 50.0).clamp(8.0 / 0.75, 10.0 / 0.75)
 }
 
-/// Each `f_max` of an SVG as it is printed, in text of the given font size.
-fn with_f_max(svg: &str, size: f64) -> String {
+/// Quantities that are printed with an index, and the index.
+const INDEXED: [(&str, &str); 5] = [
+    ("f", "max"),
+    ("φ", "J"),
+    ("σ", "xx"),
+    ("σ", "xy"),
+    ("σ", "yy"),
+];
+
+/// Each `f_max`, `σ_xy` and the like of an SVG as it is printed, in text of the given font size.
+fn with_indices(svg: &str, size: f64) -> String {
     let (small, down) = (hundredths(0.7 * size), hundredths(0.2 * size));
-    let printed = |behind: &str| {
-        format!(
-            "<tspan font-style=\"italic\">f</tspan><tspan font-size=\"{small}\" dy=\"{down}\">max</tspan><tspan dy=\"-{down}\">{behind}</tspan>"
-        )
-    };
-    // What stands behind it goes back to the line; a space that no reader collapses, or a hair's breadth.
-    svg.replace("f_max ", &printed("\u{a0}"))
-        .replace("f_max", &printed("\u{200a}"))
+    INDEXED.iter().fold(svg.to_owned(), |svg, (letter, index)| {
+        let name = format!("{letter}_{index}");
+        let printed = |behind: &str| {
+            format!(
+                "<tspan font-style=\"italic\">{letter}</tspan><tspan font-size=\"{small}\" dy=\"{down}\">{index}</tspan><tspan dy=\"-{down}\">{behind}</tspan>"
+            )
+        };
+        // What stands behind it goes back to the line; a space that no reader collapses, or a hair's breadth.
+        svg.replace(&format!("{name} "), &printed("\u{a0}"))
+            .replace(&name, &printed("\u{200a}"))
+    })
 }
 
 /// A whole number as an exponent.

@@ -3,9 +3,9 @@
 use super::films::Films;
 use super::legend::{Legend, length};
 use super::shades::{PALE, Shades};
-use super::shapes::{circle, frame as framed, hundredths, line, page, paper, rectangle};
+use super::shapes::{circle, hundredths, line, page, paper};
 use super::sheet::Sheet;
-use super::{INK, font_size, mean, power_of_ten, with_f_max};
+use super::{INK, font_size, mean, power_of_ten, with_indices};
 use crate::analysis::FrameForces;
 use crate::contacts::{Contacts, FrameContacts};
 use crate::domain::Vec2;
@@ -18,7 +18,7 @@ use crate::text::counted;
 use core::f64::consts::PI;
 use svg::Node as _;
 use svg::node::element::path::Data;
-use svg::node::element::{ClipPath, Definitions, Group, Path};
+use svg::node::element::{Definitions, Group, Path};
 
 /// What a particle is drawn as.
 ///
@@ -121,6 +121,13 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     };
     let mut contours = scene.model.contours(smooth, line_tension);
     contours.tell(packing, frame);
+    let mut caption = caption(packing, frame, scene);
+    // Particles are drawn between the slanted sides of a sheared box.
+    let positions = frame.positions.iter();
+    let frame = &Frame {
+        positions: positions.map(|x| packing.domain().seat(*x)).collect(),
+        ..frame.clone()
+    };
     contours.draw(packing.radii(), &frame.positions, &contacts, line_tension);
     // Disks keep their shape.
     let (shape, color) = match (scene.model, style.color) {
@@ -148,7 +155,7 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
 
     let (x, y, width, height) = sheet.frame();
     let mut legend = Legend::new((x, y + height + 6.0), width, font_size(style.width));
-    let mut pieces = caption(packing, frame, scene);
+    let pieces = &mut caption;
     match (scene.model, shape) {
         (Kind::Disks, _) => pieces.push("disks".to_owned()),
         (_, Shape::Disk) => pieces.push("undeformed disks".to_owned()),
@@ -156,7 +163,7 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
         (Kind::WetFoam, Shape::Contour) => pieces.push("wet foam".to_owned()),
         (Kind::MorseWitten, Shape::Contour) => {}
     }
-    legend.lines(&pieces, ", ", 1.0);
+    legend.lines(pieces, ", ", 1.0);
     shades.key(&mut legend);
     if let Some(films) = &films {
         films.key(&mut legend);
@@ -176,13 +183,11 @@ pub fn packing(packing: &Packing, frame: &Frame, scene: &Scene, style: &Style) -
     let (legend, end) = legend.end();
 
     let total = (hundredths(style.width), (end + 10.0).ceil());
-    let outline = || rectangle((x, y), (width, height));
-    let clip = ClipPath::new().set("id", "box").add(outline());
     let svg = page(total)
-        .add(Definitions::new().add(clip))
+        .add(Definitions::new().add(sheet.clip()))
         .add(paper())
         .add(inside)
-        .add(framed(outline(), 1.2))
+        .add(sheet.edge())
         .add(legend)
         .to_string();
     symbols(&svg, font_size(style.width))
@@ -208,7 +213,7 @@ fn symbols(svg: &str, size: f64) -> String {
     };
     QUANTITIES
         .iter()
-        .fold(with_f_max(svg, size), |svg, quantity| {
+        .fold(with_indices(svg, size), |svg, quantity| {
             svg.replace(quantity, &italic(quantity))
         })
 }
@@ -235,8 +240,9 @@ fn particles(
                 particles.append(path.set("fill", fill.as_str()));
             }
         } else {
-            let corner = Vec2::repeat(radius);
-            for shift in sheet.images(&[center - corner, center + corner]) {
+            let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+            let around = corners.map(|[x, y]| center + radius * Vec2::new(x, y));
+            for shift in sheet.images(&around) {
                 let disk = circle(sheet.place(center + shift), sheet.pixels(radius));
                 outlines.append(disk.clone());
                 particles.append(disk.set("fill", fill.as_str()));
@@ -356,6 +362,8 @@ fn caption(packing: &Packing, frame: &Frame, scene: &Scene) -> Vec<String> {
         format!("φ = {:.3}", packing.coverage()),
         format!("step {}", frame.step),
     ];
+    // The first number of a protocol.
+    caption.extend((frame.protocol.first()).map(|strain| format!("strain {strain:.4}")));
     if let Ok(forces) = FrameForces::of(packing, frame, scene.model()) {
         let f_max = power_of_ten(forces.observables().f_max);
         caption.push(format!("f_max = {f_max} γ"));

@@ -1,9 +1,12 @@
 //! Where things lie on the sheet: the box, its points, and arcs in it.
 
-use super::shapes::hundredths;
+use super::INK;
+use super::shapes::{hundredths, rectangle};
 use crate::domain::{Domain, Vec2};
 use crate::models::droplet::contour::Arc;
+use svg::Node;
 use svg::node::element::path::Data;
+use svg::node::element::{ClipPath, Element, Path};
 
 /// The margin around the box (pixels).
 pub(super) const MARGIN: f64 = 14.0;
@@ -17,6 +20,8 @@ pub(super) struct Sheet {
     /// Pixels a length.
     pub scale: f64,
     domain: Domain,
+    /// How far the upper side of a box that leans to the left stands out there (length).
+    left: f64,
     height: f64,
 }
 
@@ -24,10 +29,11 @@ impl Sheet {
     /// `width` is that of the whole figure.
     pub fn of(domain: Domain, width: f64) -> Self {
         let lengths = domain.lengths();
-        let scale = (width - 2.0 * MARGIN) / lengths.x;
+        let scale = (width - 2.0 * MARGIN) / (lengths.x + domain.tilt().abs());
         Self {
             scale,
             domain,
+            left: (-domain.tilt()).max(0.0),
             height: scale * lengths.y + 2.0 * MARGIN,
         }
     }
@@ -36,28 +42,60 @@ impl Sheet {
         hundredths(self.scale * length)
     }
 
-    /// Left, top, width and height of the box.
+    /// Left, top, width and height of the box, what leans over included.
     pub fn frame(&self) -> (f64, f64, f64, f64) {
         let l = self.domain.lengths();
-        (MARGIN, MARGIN, self.pixels(l.x), self.pixels(l.y))
+        let width = self.pixels(l.x + self.domain.tilt().abs());
+        (MARGIN, MARGIN, width, self.pixels(l.y))
+    }
+
+    /// The area of the box, as what others are clipped by.
+    pub fn clip(&self) -> ClipPath {
+        let mut clip = ClipPath::new().set("id", "box");
+        clip.append(self.outline());
+        clip
+    }
+
+    /// The box as a line.
+    pub fn edge(&self) -> Element {
+        let mut edge = self.outline();
+        edge.assign("fill", "none");
+        edge.assign("stroke", INK);
+        edge.assign("stroke-width", 1.2);
+        edge
+    }
+
+    fn outline(&self) -> Element {
+        if self.domain.tilt() == 0.0 {
+            let (x, y, width, height) = self.frame();
+            return rectangle((x, y), (width, height)).into();
+        }
+        let [first, rest @ ..] = self.domain.corners().map(|corner| self.place(corner));
+        let data = rest[..3]
+            .iter()
+            .fold(Data::new().move_to(first), |data, &at| data.line_to(at));
+        Path::new().set("d", data.close()).into()
     }
 
     /// A point of the packing, whose y points up.
     pub fn place(&self, v: Vec2) -> (f64, f64) {
         let y = self.height - MARGIN - self.scale * v.y;
-        (hundredths(MARGIN + self.scale * v.x), hundredths(y))
+        let x = MARGIN + self.scale * (v.x + self.left);
+        (hundredths(x), hundredths(y))
     }
 
     /// The shifts by a period that bring a shape into the box.
     pub fn images(&self, points: &[Vec2]) -> Vec<Vec2> {
         let (mut least, mut most) = (Vec2::repeat(f64::MAX), Vec2::repeat(f64::MIN));
-        for p in points {
-            least = least.inf(p);
-            most = most.sup(p);
+        // In the upright box that becomes this one when it is sheared.
+        for p in points.iter().map(|p| self.domain.straightened(*p)) {
+            least = least.inf(&p);
+            most = most.sup(&p);
         }
         let l = self.domain.lengths();
         let meets = |shift: &Vec2| {
-            let (a, b) = (least + shift, most + shift);
+            let upright = self.domain.straightened(*shift);
+            let (a, b) = (least + upright, most + upright);
             a.x < l.x && a.y < l.y && b.x > 0.0 && b.y > 0.0
         };
         self.domain.around().filter(meets).collect()

@@ -1,7 +1,8 @@
 //! The layout that a recording opens with: the packing at the left; the fall of `f_max`, the metrics and the scene at the
-//! right. It is the same for all recordings.
+//! right. It is the same for all recordings but those of a protocol, which have a row of plots more.
 
 use super::encode::Encoder;
+use crate::scene::Scene;
 use rerun::datatypes::{TimeRange, TimeRangeBoundary};
 use rerun::external::re_log_types::{StoreId, StoreKind};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
@@ -70,6 +71,34 @@ const PLOTS: [View; 4] = [
     },
 ];
 
+/// What a protocol has beside them.
+const PROTOCOL: [View; 3] = [
+    View {
+        number: 7,
+        class: "TimeSeries",
+        title: "φ",
+        origin: "/metrics",
+        contents: &["+ /metrics/phi"],
+        curve: [220, 150, 255],
+    },
+    View {
+        number: 8,
+        class: "TimeSeries",
+        title: "Strain",
+        origin: "/metrics",
+        contents: &["+ /metrics/strain"],
+        curve: [90, 220, 210],
+    },
+    View {
+        number: 9,
+        class: "TimeSeries",
+        title: "σ_xy (γ/length)",
+        origin: "/metrics",
+        contents: &["+ /metrics/stress_xy"],
+        curve: [255, 120, 120],
+    },
+];
+
 const SCENE: View = View {
     number: 5,
     class: "TextDocument",
@@ -92,8 +121,18 @@ fn uuid(number: u8) -> rerun::external::uuid::Uuid {
     )
 }
 
-/// Writes the blueprint of the recording `recording` and makes it the one shown.
-pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::Result<()> {
+/// Writes the blueprint of the recording `recording` of a run of `scene` and makes it the one shown.
+pub(super) fn write<W: Write>(
+    encoder: &mut Encoder<W>,
+    recording: &str,
+    scene: &Scene,
+) -> io::Result<()> {
+    let protocol: &[View] = if scene.protocol.is_empty() {
+        &[]
+    } else {
+        &PROTOCOL
+    };
+    let plots = || PLOTS.iter().chain(protocol);
     let store = StoreId::new(
         StoreKind::Blueprint,
         env!("CARGO_PKG_NAME"),
@@ -105,7 +144,7 @@ pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::
         let time = TimePoint::default().with(Timeline::new_sequence("blueprint"), 0);
         encoder.single(store, entity, time, data)
     };
-    for view in PLOTS.iter().chain([&PACKING, &SCENE]) {
+    for view in plots().chain([&PACKING, &SCENE]) {
         let path = view.path();
         log(
             &format!("{path}/ViewContents"),
@@ -121,7 +160,7 @@ pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::
         start: TimeRangeBoundary::Infinite,
         end: TimeRangeBoundary::Infinite,
     };
-    for plot in &PLOTS {
+    for plot in plots() {
         log(
             &format!("{}/TimeAxis", plot.path()),
             &TimeAxis::new()
@@ -162,12 +201,25 @@ pub(super) fn write<W: Write>(encoder: &mut Encoder<W>, recording: &str) -> io::
         &ContainerBlueprint::new(ContainerKind::Horizontal)
             .with_contents(rest.iter().map(View::path)),
     )?;
+    let (mut below, mut shares) = (vec![fall.path(), row.clone()], vec![5.0, 3.5]);
+    if !protocol.is_empty() {
+        let second = container(13);
+        log(
+            &second,
+            &ContainerBlueprint::new(ContainerKind::Horizontal)
+                .with_contents(protocol.iter().map(View::path)),
+        )?;
+        below.push(second);
+        shares.push(3.5);
+    }
+    below.push(SCENE.path());
+    shares.push(if protocol.is_empty() { 5.0 } else { 3.0 });
     log(
         &side,
         &ContainerBlueprint::new(ContainerKind::Vertical)
             .with_display_name("Relaxation")
-            .with_contents([fall.path(), row.clone(), SCENE.path()])
-            .with_row_shares([5.0, 3.5, 5.0]),
+            .with_contents(below)
+            .with_row_shares(shares),
     )?;
     log(
         &root,

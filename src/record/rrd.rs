@@ -91,7 +91,7 @@ impl<W: Write> RrdRecorder<W> {
     }
 
     fn start(mut encoder: Encoder<W>, header: Header, recording: &str) -> io::Result<Self> {
-        blueprint::write(&mut encoder, recording)?;
+        blueprint::write(&mut encoder, recording, &header.scene)?;
         let store = StoreId::recording(env!("CARGO_PKG_NAME"), recording);
         encoder.open(&store)?;
         encoder.number_from(header.from_step);

@@ -30,13 +30,15 @@ SIZE = (1600, 900)
 LEFT, TOP, BOTTOM = int(SIZE[0] * 6 / 11) - 4, 55, 865
 EDGE, RATTLER = (200, 200, 200), (170, 170, 170)
 CURVES = {"log10_f_max": (255, 170, 60), "coordination": (100, 190, 255), "pressure": (80, 220, 120), "energy": (250, 220, 80)}
+# What a protocol has beside them.
+PROTOCOL = {"phi": (220, 150, 255), "strain": (90, 220, 210), "stress_xy": (255, 120, 120)}
 
 
 class Recording:
     """The last frame of a recording that has contours, and how many steps have metrics."""
 
     def __init__(self, path):
-        states, self.contours, self.curves = {}, {}, {}
+        states, boxes, self.contours, self.curves = {}, {}, {}, {}
         for chunk in rerun.RrdReader(path).stream().to_chunks():
             batch, entity = chunk.to_record_batch(), str(chunk.entity_path)
             if entity == "/particles":
@@ -48,16 +50,34 @@ class Recording:
             if entity == "/state":
                 columns = [batch["softjam.State:" + name] for name in ("position", "contact", "force")]
                 states |= {step: [cell.as_py() for cell in row] for step, *row in zip(steps, *columns)}
+                if "softjam.State:box" in batch.schema.names:
+                    boxes |= dict(zip(steps, batch["softjam.State:box"].to_pylist()))
             elif entity == "/world/contours":
                 self.contours |= dict(zip(steps, batch["LineStrips2D:strips"]))
             elif entity.startswith("/metrics/"):
-                self.curves.setdefault(entity.removeprefix("/metrics/"), set()).update(steps)
+                values = batch["Scalars:scalars"].to_pylist()
+                self.curves.setdefault(entity.removeprefix("/metrics/"), {}).update(zip(steps, [v[0] for v in values]))
+        self.tilt = 0
         if self.contours:
             # Where a file breaks off, the last picture need not have a state.
             self.last = max(self.contours)
             self.step = max(set(states) & set(self.contours))
             self.positions, self.contacts, self.forces = (np.array(a) for a in states[self.step])
+            if boxes.get(self.step):
+                *self.box, self.tilt = np.array(boxes[self.step])
+                self.box = np.array(self.box)
+            # Particles are drawn between the slanted sides of a sheared box.
+            self.positions[:, 0] -= self.box[0] * np.floor(self.upright(self.positions)[:, 0] / self.box[0])
             self.strips = [np.array(s) for s in self.contours[self.step].as_py()]
+
+    def upright(self, points):
+        """Where points of a sheared box would be in the upright one."""
+        return points - np.multiply.outer(points[:, 1] / self.box[1], [self.tilt, 0])
+
+    def nearest(self, d):
+        """The differences of the nearest images."""
+        d = d - np.multiply.outer(np.rint(d[..., 1] / self.box[1]), [self.tilt, self.box[1]])
+        return d - np.multiply.outer(np.rint(d[..., 0] / self.box[0]), [self.box[0], 0])
 
 
 def shades(name, places):
@@ -90,12 +110,11 @@ def expected(r):
     discs = (r.positions[:, None] + ring).reshape(-1, 2)
     outline = np.concatenate([0.5 * (s[1:] + s[:-1]) for s in r.strips] + [s[:-1] for s in r.strips])
     outline_color = np.concatenate([np.repeat(color, [len(s) - 1 for s in r.strips], axis=0)] * 2)
-    shifts = [np.array([x, y]) * box for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
-    inside = lambda v: ((v > 0.01 * box) & (v < 0.99 * box)).all(axis=1)
+    shifts = [np.array([x * box[0] + y * r.tilt, y * box[1]]) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
+    inside = lambda v: ((r.upright(v) > 0.01 * box) & (r.upright(v) < 0.99 * box)).all(axis=1)
     images = [(outline + s)[inside(outline + s)] for s in shifts]
     image_color = [0.65 * outline_color[inside(outline + s)] for s in shifts]
-    d = r.positions[i] - r.positions[j]
-    d -= box * np.rint(d / box)
+    d = r.nearest(r.positions[i] - r.positions[j])
     # Off the middle, where contours cross.
     parts = np.array([0.3, 0.35, 0.4, 0.6, 0.65, 0.7])
     chain = (r.positions[i][:, None] - parts[:, None] * d[:, None]).reshape(-1, 2)
@@ -115,17 +134,19 @@ def near(picture, color, tolerance=14):
     return (np.abs(picture - np.array(color)) <= tolerance).all(axis=-1)
 
 
-def find_box(picture):
-    """Left, right, top and bottom of the box in pixels."""
+def find_box(picture, r):
+    """Left and right end of the lower side of the box, its top and its bottom, in pixels."""
     gray = near(picture[TOP:BOTTOM, :LEFT], EDGE)
     columns, rows = np.flatnonzero(gray.sum(axis=0) > 200), np.flatnonzero(gray.sum(axis=1) > 200)
+    if r.tilt and len(rows):
+        columns = np.flatnonzero(gray[rows[-1]])
     assert len(columns) > 1 and len(rows) > 1, "no box is seen"
     return columns[0], columns[-1], TOP + rows[0], TOP + rows[-1]
 
 
 def look(picture, r):
     """Compares a picture with what should be in it; the shares of places that look as they should."""
-    left, right, top, bottom = find_box(picture)
+    left, right, top, bottom = find_box(picture, r)
     scale = (right - left) / r.box[0], (bottom - top) / r.box[1]
     assert abs(scale[0] / scale[1] - 1) < 0.01, f"axes are not equal: {scale}"
     assert right - left > 0.5 * LEFT or bottom - top > 0.5 * (BOTTOM - TOP), "the box is small"
@@ -145,7 +166,7 @@ def look(picture, r):
 
 def look_at_shapes(picture, r):
     """The last picture of a file that breaks off, whose state is lost: something bright on every contour."""
-    left, right, top, bottom = find_box(picture)
+    left, right, top, bottom = find_box(picture, r)
     outline = np.concatenate([np.array(s) for s in r.contours[r.last].as_py()])
     x = np.rint(left + (right - left) / r.box[0] * outline[:, 0]).astype(int)
     y = np.rint(bottom - (bottom - top) / r.box[1] * outline[:, 1]).astype(int)
@@ -156,7 +177,7 @@ def look_at_shapes(picture, r):
 
 def look_at_nothing(picture, r):
     """A recording without pictures: the box, and nothing coloured in it."""
-    left, right, top, bottom = find_box(picture)
+    left, right, top, bottom = find_box(picture, r)
     inside = picture[top + 4 : bottom - 4, left + 4 : right - 4]
     assert (inside.max(axis=-1) < 30).all(), "something is in a box of which nothing was recorded"
     return {}
@@ -165,17 +186,21 @@ def look_at_nothing(picture, r):
 def look_aside(picture, r):
     """The plots, each with a curve that fills it, and the scene as text."""
     aside = picture[:, LEFT + 10 :]
-    for name, color in CURVES.items():
-        # A run that is over at once has no curve to speak of.
-        if len(r.curves.get(name, ())) < 20:
+    protocol = "strain" in r.curves
+    # A protocol has a row of plots more.
+    text, upper, lower = (690, 235, 145) if protocol else (560, 270, 170)
+    for name, color in (CURVES | (PROTOCOL if protocol else {})).items():
+        # A run that is over at once has no curve to speak of, and what does not change has none that fills a plot.
+        values = r.curves.get(name, {}).values()
+        if len(values) < 20 or max(values) - min(values) < 1e-12:
             continue
-        rows, columns = np.nonzero(near(aside[:560], color, 30))
+        rows, columns = np.nonzero(near(aside[:text], color, 30))
         assert len(rows) > 100, f"the curve of {name} has {len(rows)} pixels"
         # The fall has the upper plot for its own, the others share the row below it.
-        room = np.array([270, aside.shape[1]] if name == "log10_f_max" else [170, aside.shape[1] / 3])
+        room = np.array([upper, aside.shape[1]] if name == "log10_f_max" else [lower, aside.shape[1] / 3])
         filled = np.array([np.ptp(rows), np.ptp(columns)]) / room
         assert (filled > 0.7).all(), f"the curve of {name} fills {filled[0]:.0%} of its plot's height, {filled[1]:.0%} of its width"
-    letters = (aside[560:860] > 120).all(axis=-1).mean()
+    letters = (aside[text:860] > 120).all(axis=-1).mean()
     assert letters > 0.01, f"{letters:.2%} of the text's place is bright"
 
 
@@ -276,7 +301,7 @@ def main():
     full = [s for s in seen if s[2] is look]
     assert full, "no recording with contours and contacts"
     for picture, r, *_ in full:
-        left, right, top, bottom = find_box(picture)
+        left, right, top, bottom = find_box(picture, r)
         upside_down, shuffled, empty = picture.copy(), picture.copy(), picture.copy()
         part = np.s_[top + 4 : bottom - 4, left + 4 : right - 4]
         upside_down[part] = picture[part][::-1]
@@ -289,7 +314,7 @@ def main():
         must_fail("empty", empty, r)
     picture, r, _, path = full[-1]
     no_curves = picture.copy()
-    no_curves[60:560, LEFT + 10 :] = 0
+    no_curves[60:690, LEFT + 10 :] = 0
     must_fail("without curves", no_curves, r, look_aside)
     with tempfile.TemporaryDirectory() as rest:
         for entity in ("contours", "contours/images", "particles", "contacts", "contacts/images"):
@@ -306,6 +331,8 @@ def without(entity, path, folder):
 
 def mirror_image(r):
     """Whether the packing looks the same upside down."""
+    if r.tilt:
+        return False
     mirrored = r.positions * [1, -1]
     d = r.positions[:, None] - mirrored
     d -= r.box * np.rint(d / r.box)

@@ -72,6 +72,63 @@ fn a_particle_is_drawn_on_every_side_of_the_box_that_it_reaches() {
 }
 
 #[test]
+fn a_sheared_packing_is_drawn_between_its_slanted_sides() {
+    for tilt in [3.0, -3.0] {
+        let domain = Domain::new(10.0, 8.0).unwrap().tilted(tilt).unwrap();
+        let drawn = |x, y, shape| {
+            let at = domain.wrap(Vec2::new(x, y));
+            let packing = Packing::new(domain, vec![0.5], vec![at]).unwrap();
+            let style = Style {
+                shape,
+                width: 1328.0,
+                ..Style::default()
+            };
+            let frame = Frame {
+                domain: Some(domain),
+                ..frame_of(&packing)
+            };
+            draw(&packing, &frame, &Scene::default(), &style)
+        };
+        let centers = |x, y| {
+            let shapes = paths(&drawn(x, y, Shape::Contour));
+            // Without the outline of the box, which is the area that is seen and a line above it.
+            let mut centers: Vec<[i64; 2]> = shapes[1..shapes.len() - 1]
+                .iter()
+                .map(|shape| {
+                    let sum = shape.iter().fold([0.0; 2], |s, p| [s[0] + p.0, s[1] + p.1]);
+                    sum.map(|x| (x / shape.len() as f64).round() as i64)
+                })
+                .collect();
+            centers.sort_unstable();
+            let disks = drawn(x, y, Shape::Disk).matches("<circle").count();
+            // Each disk is filled, and has an outline above all of them.
+            assert_eq!(disks, 2 * centers.len());
+            centers
+        };
+        // A hundred pixels a length, y upwards, the corners where the periods lead.
+        let pixel = |x: f64, y: f64| {
+            let left = 14.0 + 100.0 * (-tilt).max(0.0);
+            [left + 100.0 * x, 814.0 - 100.0 * y].map(|x| x.round() as i64)
+        };
+        let corners = [[0.0, 0.0], [10.0, 0.0], [10.0 + tilt, 8.0], [tilt, 8.0]];
+        let outline = &paths(&drawn(5.0, 4.0, Shape::Contour))[0];
+        let at = |k: usize| [outline[k].0, outline[k].1].map(|x| x.round() as i64);
+        assert_eq!([0, 1, 2, 3].map(at), corners.map(|[x, y]| pixel(x, y)));
+        // In the middle, by the slanted side, across it, and across the upper side, where the image is displaced.
+        let middle = 5.0 + 0.5 * tilt;
+        assert_eq!(centers(middle, 4.0), [pixel(middle, 4.0)]);
+        let right = 9.3 + 0.75 * tilt;
+        assert_eq!(centers(right, 6.0), [pixel(right, 6.0)]);
+        let across = 9.8 + 0.75 * tilt;
+        let both = [pixel(across - 10.0, 6.0), pixel(across, 6.0)];
+        assert_eq!(centers(across, 6.0), both);
+        let mut above = [pixel(middle, 7.9), pixel(middle - tilt, -0.1)];
+        above.sort_unstable();
+        assert_eq!(centers(middle, 7.9), above);
+    }
+}
+
+#[test]
 fn contours_are_dented_where_disks_overlap_and_chains_join_centres() {
     let domain = Domain::new(10.0, 10.0).unwrap();
     let centers = vec![Vec2::new(4.6, 5.0), Vec2::new(5.4, 5.0)];

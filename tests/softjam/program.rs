@@ -2,6 +2,7 @@
 
 mod cases;
 mod convert;
+mod figures;
 #[cfg(unix)]
 mod files;
 mod help;
