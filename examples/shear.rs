@@ -17,7 +17,7 @@ use std::path::PathBuf;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = PathBuf::from(arguments.next().unwrap_or(".".to_owned()));
-    let strain: f64 = arguments.next().map_or(Ok(0.1), |s| s.parse())?;
+    let strain: f64 = arguments.next().map_or(Ok(0.3), |s| s.parse())?;
     let models = [
         ("disks", Kind::Disks, Form::Central),
         ("Morse–Witten droplets", Kind::MorseWitten, Form::Gradient),

@@ -48,8 +48,8 @@ pub struct Arguments {
     fmax: bool,
 
     /// Draw the shear stress (γ/length) of the relaxed states of a protocol against its strain: σ_xy of simple shear, σ_xx − σ_yy of pure
-    /// shear. A dot is the state before a yield event: a step that loses energy, or, with central forces, which have none to lose, one in
-    /// which the stress falls by more than 1e-4 γ a small diameter.
+    /// shear. A dot is the state before a yield event: a step that loses energy (more than 3 γ a small diameter, times area and
+    /// strain²; not with central forces, which have none to lose), or in which the stress falls by more than 1 γ a small diameter times the strain.
     #[arg(long, conflicts_with_all = OF_A_PACKING, conflicts_with = "fmax")]
     stress_strain: bool,
 

@@ -46,7 +46,7 @@ pub struct Course {
     pub states: Vec<RelaxedState>,
     /// Whether the shear is a pure one, whose stress is `σ_xx − σ_yy` and not `σ_xy`.
     pub pure: bool,
-    /// Whether the forces are the gradient of the energy, so that a step loses energy where particles rearrange and nowhere else.
+    /// Whether the forces are the gradient of the energy, so that what a step loses of energy says where particles rearrange.
     pub has_potential: bool,
     /// The smallest diameter (length).
     pub diameter: f64,
@@ -57,8 +57,8 @@ pub struct Course {
 /// A step that loses more energy than this, per area and strain² and in γ a diameter, is a yield event: in elastic steps it is below 1.
 const LOST: f64 = 3.0;
 
-/// A step of forces without a potential is one if the stress falls by more than this (γ a diameter).
-const FALLS: f64 = 1e-4;
+/// And so is one in which the stress falls by more than this times the strain (γ a diameter), which is steeper than it ever rises.
+const FALLS: f64 = 1.0;
 
 /// Each state is a dot in pressure against coverage unless there are more.
 const DOTS: usize = 200;
@@ -66,20 +66,18 @@ const DOTS: usize = 200;
 impl Course {
     /// The numbers of the states behind which particles rearrange in a step of shear.
     ///
-    /// Where the forces have a potential, that is where the work of the step is more than what the energy rises by; else where the stress falls.
+    /// Those are steps in which the stress falls steeply or, where the forces have a potential, the work is more than what the energy rises by.
     pub fn yields(&self) -> impl Iterator<Item = usize> + '_ {
         let pairs = self.states.windows(2).enumerate();
         pairs.filter_map(|(k, pair)| {
             let (before, behind) = (&pair[0], &pair[1]);
             let step = behind.strain - before.strain;
             let [from, to] = [before, behind].map(|state| self.shear_stress(state));
-            let lost = if self.has_potential {
-                let stored = (behind.energy - before.energy) / before.area;
-                (0.5 * (from + to) * step - stored) / (step * step) / LOST
-            } else {
-                (from - to) * step.signum() / FALLS
-            };
-            (step != 0.0 && lost * self.diameter > 1.0).then_some(k)
+            let stored = (behind.energy - before.energy) / before.area;
+            let lost = (0.5 * (from + to) * step - stored) / (step * step);
+            let falls = self.diameter * (from - to) / step > FALLS;
+            let loses = self.has_potential && self.diameter * lost > LOST;
+            (step != 0.0 && (falls || loses)).then_some(k)
         })
     }
 
@@ -231,7 +229,7 @@ mod tests {
         let lossy = [0.0, 0.0011, 0.0011 + 0.000_8];
         assert_eq!(yields(sheared(stress, lossy, true)), [1]);
         assert!(yields(sheared(stress, lossy, false)).is_empty());
-        let drop = [-0.010, -0.012, -0.011];
+        let drop = [-0.010, -0.012, -0.0109];
         assert_eq!(yields(sheared(drop, elastic, false)), [1]);
     }
 }

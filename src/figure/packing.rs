@@ -363,7 +363,8 @@ fn caption(packing: &Packing, frame: &Frame, scene: &Scene) -> Vec<String> {
         format!("step {}", frame.step),
     ];
     // The first number of a protocol.
-    caption.extend((frame.protocol.first()).map(|strain| format!("strain {strain:.4}")));
+    let strain = frame.protocol.first().filter(|strain| **strain != 0.0);
+    caption.extend(strain.map(|strain| format!("strain {strain:.4}")));
     if let Ok(forces) = FrameForces::of(packing, frame, scene.model()) {
         let f_max = power_of_ten(forces.observables().f_max);
         caption.push(format!("f_max = {f_max} γ"));

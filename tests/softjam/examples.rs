@@ -243,8 +243,9 @@ fn shear_yields_again_and_again_at_a_stress_that_stays() {
         let [states, events, stress, _] = row[..] else {
             panic!("{row:?}")
         };
-        assert_eq!(states, 101.0);
-        assert_within("events", events, 5.0, 60.0);
+        assert_eq!(states, 301.0);
+        // Stress drops 130 to 140 times a unit strain by more than 1e-4, of which these are the larger ones.
+        assert_within("events", events, 8.0, 45.0);
         // The plateau of disks is 0.0066(7), of droplets 0.011 at the slowest flow that was measured; so short a way has not forgotten its start.
         assert_within("stress", stress, 0.001, 0.03);
     }
