@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let power = |label: &str, factor: f64, exponent: f64| Curve {
         label: label.to_owned(),
         points: [1e-5, 4e-2]
-            .map(|x: f64| (x, factor * x.powf(exponent)))
+            .map(|x: f64| (x, factor * libm::pow(x, exponent)))
             .to_vec(),
         mark: Mark::Dashes,
         ..Curve::default()

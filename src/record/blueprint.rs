@@ -155,29 +155,7 @@ pub(super) fn write<W: Write>(
             .with_space_origin(view.origin);
         log(&path, &blueprint)?;
     }
-    // The whole run on every plot, wherever the time cursor is.
-    let everything = TimeRange {
-        start: TimeRangeBoundary::Infinite,
-        end: TimeRangeBoundary::Infinite,
-    };
-    for plot in plots() {
-        log(
-            &format!("{}/TimeAxis", plot.path()),
-            &TimeAxis::new()
-                .with_link(LinkAxis::Independent)
-                .with_view_range(everything),
-        )?;
-        let [r, g, b] = plot.curve;
-        let curve = SeriesLines::new()
-            .with_colors([Color::from_rgb(r, g, b)])
-            .with_widths([2.0]);
-        log(&format!("{}/defaults", plot.path()), &curve)?;
-        // One curve a plot, whose title names it.
-        log(
-            &format!("{}/PlotLegend", plot.path()),
-            &PlotLegend::new().with_visible(false),
-        )?;
-    }
+    write_plots(&mut log, plots())?;
     // No bounds are said: the view fits what there is. A blueprint holds for all recordings that are open, whatever the
     // sizes of their boxes.
     let of = |entity: &str| {
@@ -234,6 +212,43 @@ pub(super) fn write<W: Write>(
             .with_auto_layout(false)
             .with_auto_views(false),
     )?;
+    write_panels(&mut log)?;
+    encoder.activate(store)
+}
+
+/// The axes and curves of plots.
+fn write_plots<'a>(
+    log: &mut impl FnMut(&str, &dyn AsComponents) -> io::Result<()>,
+    plots: impl Iterator<Item = &'a View>,
+) -> io::Result<()> {
+    // The whole run on every plot, wherever the time cursor is.
+    let everything = TimeRange {
+        start: TimeRangeBoundary::Infinite,
+        end: TimeRangeBoundary::Infinite,
+    };
+    for plot in plots {
+        log(
+            &format!("{}/TimeAxis", plot.path()),
+            &TimeAxis::new()
+                .with_link(LinkAxis::Independent)
+                .with_view_range(everything),
+        )?;
+        let [r, g, b] = plot.curve;
+        let curve = SeriesLines::new()
+            .with_colors([Color::from_rgb(r, g, b)])
+            .with_widths([2.0]);
+        log(&format!("{}/defaults", plot.path()), &curve)?;
+        // One curve a plot, whose title names it.
+        log(
+            &format!("{}/PlotLegend", plot.path()),
+            &PlotLegend::new().with_visible(false),
+        )?;
+    }
+    Ok(())
+}
+
+/// What stands around the views.
+fn write_panels(log: &mut impl FnMut(&str, &dyn AsComponents) -> io::Result<()>) -> io::Result<()> {
     let folded = PanelBlueprint::new().with_state(PanelState::Collapsed);
     log("blueprint_panel", &folded)?;
     log("selection_panel", &folded)?;
@@ -244,6 +259,5 @@ pub(super) fn write<W: Write>(
             .with_timeline("step")
             // A recording opens on its last frame, the packing in balance.
             .with_play_state(PlayState::Following),
-    )?;
-    encoder.activate(store)
+    )
 }

@@ -193,9 +193,9 @@ fn multiply_blocks(
             place.width(),
             #[inline(always)]
             |width| {
-                for g in 0..width {
+                for (g, image) in images.iter_mut().enumerate().take(width) {
                     let each = sides.iter().map(|side| direction[side.line as usize]);
-                    images[g] = combine(blocks, (g, width), each);
+                    *image = combine(blocks, (g, width), each);
                 }
             },
         );
@@ -217,7 +217,7 @@ fn gather(layout: &Sides, images: &[Lanes<f32>], direction: &[f32], image: &mut 
 fn scale(state: &State, diagonal: &[f64], roots: &mut [f64]) {
     let lines = state.gaps().iter().zip(state.loads()).zip(diagonal);
     for (root, ((gap, load), d)) in roots.iter_mut().zip(lines) {
-        let within = (*load > 0.0) | (*gap < 0.0);
+        let within = *load > 0.0 || *gap < 0.0;
         let own = 1.0 / d.sqrt();
         *root = if within { own } else { 0.0 };
     }

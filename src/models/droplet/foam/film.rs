@@ -45,19 +45,19 @@ pub(super) struct Film {
 #[inline(always)]
 fn bend(z: f64) -> (f64, f64) {
     const P: [f64; 6] = [
-        1.666_666_666_666_666_574_15e-1,
-        -3.255_658_186_224_009_154_05e-1,
-        2.012_125_321_348_629_258_81e-1,
-        -4.005_553_450_067_941_140_27e-2,
-        7.915_349_942_898_145_321_76e-4,
-        3.479_331_075_960_211_675_70e-5,
+        0.166_666_666_666_666_66,
+        -0.325_565_818_622_400_9,
+        0.201_212_532_134_862_93,
+        -0.040_055_534_500_679_41,
+        0.000_791_534_994_289_814_5,
+        3.479_331_075_960_212e-05,
     ];
     const Q: [f64; 5] = [
         1.0,
-        -2.403_394_911_734_414_218_78,
-        2.020_945_760_233_505_694_71,
-        -6.882_839_716_054_532_930_30e-1,
-        7.703_815_055_590_193_527_91e-2,
+        -2.403_394_911_734_414,
+        2.020_945_760_233_505_7,
+        -0.688_283_971_605_453_3,
+        0.077_038_150_555_901_94,
     ];
     let z2 = z * z;
     let mut p = P[5];
@@ -179,7 +179,7 @@ pub(super) struct Arcs {
     sums: Vec<f64>,
     slopes: Vec<f64>,
     cosines: Vec<f64>,
-    arcs: Vec<f64>,
+    bends: Vec<f64>,
     /// Room for what films have.
     first: Vec<f64>,
     second: Vec<f64>,
@@ -193,7 +193,7 @@ impl Arcs {
             &mut self.sums,
             &mut self.slopes,
             &mut self.cosines,
-            &mut self.arcs,
+            &mut self.bends,
             &mut self.first,
             &mut self.second,
         ] {
@@ -205,10 +205,10 @@ impl Arcs {
             (*sum, *slope) = (i + j, j - i);
         }
         quotients(&mut self.slopes, &self.sums);
-        bends(loads, &self.slopes, &mut self.cosines, &mut self.arcs);
+        bends(loads, &self.slopes, &mut self.cosines, &mut self.bends);
         let steepest = steepest(loads, &self.slopes);
         if steepest > QUOTIENT {
-            for ((arc, slope), f) in self.arcs.iter_mut().zip(&self.slopes).zip(loads) {
+            for ((arc, slope), f) in self.bends.iter_mut().zip(&self.slopes).zip(loads) {
                 *arc = self::arc(0.5 * slope * f);
             }
         }
@@ -219,7 +219,7 @@ impl Arcs {
     #[inline(always)]
     pub fn each(&mut self, loads: &[f64], of: impl Fn(Film) -> [f64; 2]) -> [&[f64]; 2] {
         let given = (&self.sums[..], &self.slopes[..]);
-        let given = (given, (&self.cosines[..], &self.arcs[..]), loads);
+        let given = (given, (&self.cosines[..], &self.bends[..]), loads);
         columns(given, (&mut self.first, &mut self.second), of);
         [&self.first, &self.second]
     }
@@ -232,15 +232,18 @@ impl Arcs {
             sum: self.sums[line],
             slope: self.slopes[line],
             cos: self.cosines[line],
-            arc: self.arcs[line],
+            arc: self.bends[line],
         }
     }
 }
 
+/// Sums and differences of the corner radii, `cos δ` and `a`, and the loads of films.
+type Columns<'a> = ((&'a [f64], &'a [f64]), (&'a [f64], &'a [f64]), &'a [f64]);
+
 /// Numbers of films, several at once.
 #[inline(always)]
 fn columns(
-    ((sums, slopes), (cosines, arcs), loads): ((&[f64], &[f64]), (&[f64], &[f64]), &[f64]),
+    ((sums, slopes), (cosines, arcs), loads): Columns<'_>,
     (first, second): (&mut [f64], &mut [f64]),
     of: impl Fn(Film) -> [f64; 2],
 ) {

@@ -72,7 +72,7 @@ pub(super) struct Sides {
     places: Vec<Place>,
     /// The number of each droplet's place.
     of_droplets: Vec<u32>,
-    sides: Vec<Side>,
+    list: Vec<Side>,
     /// The side that a line is of its first and its second droplet.
     of_lines: Vec<[u32; 2]>,
     /// The groups of all blocks.
@@ -111,8 +111,8 @@ impl Sides {
             line: u32::MAX,
             is_second: false,
         };
-        self.sides.clear();
-        self.sides.resize(LANES * group as usize, none);
+        self.list.clear();
+        self.list.resize(LANES * group as usize, none);
         self.of_lines.clear();
         for (line, &[i, j]) in (0..).zip(pairs) {
             self.of_lines
@@ -120,7 +120,7 @@ impl Sides {
                     let place = &mut self.places[self.of_droplets[p as usize] as usize];
                     let side = LANES as u32 * place.group + place.count;
                     place.count += 1;
-                    self.sides[side as usize] = Side { line, is_second };
+                    self.list[side as usize] = Side { line, is_second };
                     side
                 }));
         }
@@ -141,7 +141,7 @@ impl Sides {
     /// The groups of all droplets.
     #[inline(always)]
     pub fn groups(&self) -> usize {
-        self.sides.len() / LANES
+        self.list.len() / LANES
     }
 
     /// The groups of all blocks.
@@ -154,7 +154,7 @@ impl Sides {
     #[inline(always)]
     pub fn of(&self, place: Place) -> &[Side] {
         let first = LANES * place.group as usize;
-        &self.sides[first..first + place.count()]
+        &self.list[first..first + place.count()]
     }
 
     /// The sides that each line is of its two droplets.

@@ -304,10 +304,10 @@ impl State {
                         place.width(),
                         #[inline(always)]
                         |width| {
-                            for g in 0..width {
+                            for (g, midpoints) in midpoints.iter_mut().enumerate().take(width) {
                                 // Row l is column l with the other sign: the slope is odd.
                                 let each = pushes.as_flattened().iter().map(|f| -f);
-                                midpoints[g] = combine(rows, (g, width), each);
+                                *midpoints = combine(rows, (g, width), each);
                             }
                         },
                     );
