@@ -9,6 +9,7 @@ mod help;
 mod info;
 mod live;
 mod parts;
+mod protocol;
 mod replay;
 mod strangers;
 

@@ -280,6 +280,134 @@ fn closed_loops_of_strain_take_no_work_where_there_is_an_energy() {
     }
 }
 
+/// Disks of this sample are rigid under 1.6e-3 γ/length, and break below without a softer state in between.
+#[test]
+fn a_network_that_breaks_under_a_pressure_ends_the_search_there() {
+    let scene = Scene {
+        model: Kind::Disks,
+        protocol: vec![Stage {
+            threshold: 1e-11,
+            ..stage(Act::Jam {
+                way: Way::Halving,
+                end: 1e-5,
+            })
+        }],
+        ..scene(64, 0.70, 1)
+    };
+    let mut run = Relaxation::new(&scene).unwrap();
+    let mut relaxed = 0;
+    while run.status() == Status::Running {
+        relaxed += u32::from(run.is_relaxed_state());
+        run.advance().unwrap();
+    }
+    let found = run.jamming().unwrap();
+    let pressure = run.observables().pressure();
+    println!("{found:?} under {pressure:e} after {relaxed} relaxed states");
+    assert_eq!(run.status(), Status::Converged);
+    assert!(found.slope.is_none() && pressure > 1e-3 && relaxed < 70);
+    let under = Scene {
+        protocol: vec![stage(Act::Compress {
+            until: Until::Phi(found.phi_j - 1e-6),
+            by: Increment::Absolute(0.1),
+        })],
+        ..of_form("disks")
+    };
+    let end = states(Relaxation::of_packing(&under, run.packing().clone()).unwrap());
+    assert!(end[1].stress[0].abs() < 1e-9, "{:?}", end[1].stress);
+}
+
+#[test]
+fn a_pressure_that_is_not_met_is_an_error_and_no_end() {
+    let scene = Scene {
+        model: Kind::Disks,
+        protocol: vec![stage(Act::Compress {
+            until: Until::Pressure(50.0),
+            by: Increment::Absolute(0.1),
+        })],
+        ..scene(32, 0.9, 1)
+    };
+    let error = Relaxation::new(&scene).unwrap().find_map(Result::err);
+    let error = error.unwrap().to_string();
+    assert!(
+        error.contains("not met at any coverage below 1.3"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_run_goes_on_with_its_protocol_under_another_model() {
+    let before = Scene {
+        model: Kind::Disks,
+        protocol: vec![stage(shear(0.02, 0.01)), stage(shear(-0.01, 0.01))],
+        ..scene(32, 0.9, 1)
+    };
+    let mut run = Relaxation::new(&before).unwrap();
+    while run.stage() == 0 {
+        run.advance().unwrap();
+    }
+    let after = Scene {
+        model: Kind::MorseWitten,
+        ..before.clone()
+    };
+    let packing = run.packing().clone();
+    let run = Relaxation::take_over(&before, &after, packing, run.frame()).unwrap();
+    let strains: Vec<f64> = states(run).iter().map(|state| state.strain).collect();
+    assert_eq!(strains, [0.01, 0.02, 0.01]);
+}
+
+/// The slope of the stress is found by central differences about a state whose contacts stay.
+#[test]
+fn the_slope_of_the_stress_does_not_depend_on_the_strain_step() {
+    for (form, model) in [
+        ("disks", Kind::Disks),
+        ("mw-central", Kind::MorseWitten),
+        ("mw-gradient", Kind::MorseWitten),
+        ("disks", Kind::RoundedPolygon),
+        ("disks", Kind::WetFoam),
+    ] {
+        let base = Scene {
+            model,
+            particles: 32,
+            phi: 0.9,
+            ..of_form(form)
+        };
+        let mut compared = 0;
+        for seed in 1..=4 {
+            let run = crate::common::converged(&Scene {
+                seed,
+                ..base.clone()
+            });
+            let slope = |step: f64| {
+                let at = |strain: f64| {
+                    let protocol = vec![stage(shear(strain, step))];
+                    let scene = Scene {
+                        protocol,
+                        ..base.clone()
+                    };
+                    let found =
+                        states(Relaxation::of_packing(&scene, run.packing().clone()).unwrap());
+                    (
+                        found[1].stress[1],
+                        found.iter().all(|s| s.contacts == found[0].contacts),
+                    )
+                };
+                let ((up, same), (down, too)) = (at(step), at(-step));
+                (same && too).then_some((up - down) / (2.0 * step))
+            };
+            if let [Some(fine), Some(coarse)] = [1e-6, 1e-5].map(slope) {
+                compared += 1;
+                let off = (fine / coarse - 1.0).abs();
+                println!("{model:?} {form} {seed}: {fine} {coarse}, apart by {off:e}");
+                assert!(off < 1e-4, "{model:?} {form} {seed}: {fine} {coarse}");
+            }
+        }
+        assert!(
+            compared >= 2,
+            "{model:?} {form}: {compared} samples without events"
+        );
+    }
+}
+
 #[test]
 fn a_turn_of_the_lattice_changes_nothing() {
     let start = Relaxation::new(&scene(48, 0.9, 3))
