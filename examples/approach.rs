@@ -88,7 +88,6 @@ fn jam() -> Stage {
 }
 
 /// Coverage, pressure and excess contacts of the jammed states on the way down; φ_J and the slope of the pressure there.
-#[expect(clippy::type_complexity, reason = "three answers of one run")]
 fn decompressed(scene: &Scene) -> Result<(Vec<[f64; 3]>, f64, f64), Box<dyn Error>> {
     let mut run = Relaxation::new(scene)?;
     let mut states = Vec::new();

@@ -66,7 +66,7 @@ fn compressed(model: Kind, folder: &Path) -> Result<Vec<RelaxedState>, Box<dyn E
     loop {
         if run.is_relaxed_state() {
             let (o, phi) = (run.observables(), run.packing().coverage());
-            if states.len() % 5 == 0 || run.status() == Status::Converged {
+            if states.len().is_multiple_of(5) || run.status() == Status::Converged {
                 let (z, p) = (o.coordination(), o.pressure());
                 println!("{:13} {phi:6.3} {z:8.4} {p:13.8}", model.name());
             }

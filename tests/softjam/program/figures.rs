@@ -35,24 +35,15 @@ fn protocols_are_drawn_as_stress_against_strain_and_pressure_against_coverage() 
     // Both curves are of one start, and a dot stands for each state and in no legend.
     assert_eq!(pressure.matches("start at φ = 0.900").count(), 1);
     assert_eq!(pressure.matches("<circle").count(), 17);
+}
 
+#[test]
+fn pure_shear_has_a_stress_of_its_own_and_searches_mark_what_they_found() {
+    let folder = folder();
+    let folder = folder.path();
     let scene = "[[protocol]]\nact = 'shear'\nmode = 'pure'\nstrain = 0.003\n[[protocol]]\nact = 'jam'\n[[protocol]]\nact = 'compress'\nphi = 0.86";
     std::fs::write(folder.join("pure.toml"), scene).expect("a scene");
-    let run_of = |file: &str, more: &[&str]| {
-        let scene = [
-            "record",
-            "pure.toml",
-            "-N",
-            "32",
-            "--model",
-            "disks",
-            "-o",
-            file,
-        ];
-        run(folder, &[&scene[..], more].concat())
-    };
-    let (code, _, errors) = run_of("pure.rrd", &[]);
-    assert_eq!(code, Some(0), "{errors}");
+    record(folder, "pure.rrd", &["pure.toml", "--model", "disks"]);
     let stress = drawn(folder, &["--stress-strain", "pure.rrd"]);
     assert!(stress.contains(">xx<") && stress.contains(">yy<"));
     assert_eq!(lines(&stress), [4]);
@@ -81,7 +72,17 @@ fn protocols_are_drawn_as_stress_against_strain_and_pressure_against_coverage() 
     );
     // Of a search in the middle of a protocol as well.
     assert!(drawn(folder, &["--pressure-phi", "pure.rrd"]).contains(">J<"));
+}
 
+#[test]
+fn recordings_without_what_a_figure_shows_are_refused() {
+    let folder = folder();
+    let folder = folder.path();
+    record(folder, "sheared.rrd", &["--shear", "0.002"]);
+    let pure = "[[protocol]]\nact = 'shear'\nmode = 'pure'\nstrain = 0.002";
+    std::fs::write(folder.join("pure.toml"), pure).expect("a scene");
+    record(folder, "pure.rrd", &["pure.toml"]);
+    record(folder, "jam.rrd", &["--jam", "--model", "disks"]);
     // The last state of a run that did not converge is not relaxed.
     let limited = "[[protocol]]\nact = 'shear'\nstrain = 0.01\nsteps = 1";
     std::fs::write(folder.join("limited.toml"), limited).expect("a scene");
@@ -103,7 +104,7 @@ fn protocols_are_drawn_as_stress_against_strain_and_pressure_against_coverage() 
         (&["--stress-strain", "jam.rrd"], "no sheared states"),
         (&["--stress-strain", "limited.rrd"], "no sheared states"),
         (
-            &["--stress-strain", "a.rrd", "pure.rrd"],
+            &["--stress-strain", "sheared.rrd", "pure.rrd"],
             "simple and pure shear",
         ),
         (&["--pressure-phi", "states.rrd"], "holds no metrics"),
@@ -112,7 +113,7 @@ fn protocols_are_drawn_as_stress_against_strain_and_pressure_against_coverage() 
             "cannot be used with",
         ),
         (
-            &["--stress-strain", "a.rrd", "--films"],
+            &["--stress-strain", "jam.rrd", "--films"],
             "cannot be used with",
         ),
     ];
