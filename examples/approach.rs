@@ -87,8 +87,11 @@ fn jam() -> Stage {
     }
 }
 
+/// Coverage, pressure and excess contacts of each state; φ_J and the slope of the pressure there.
+type Branch = (Vec<[f64; 3]>, f64, f64);
+
 /// Coverage, pressure and excess contacts of the jammed states on the way down; φ_J and the slope of the pressure there.
-fn decompressed(scene: &Scene) -> Result<(Vec<[f64; 3]>, f64, f64), Box<dyn Error>> {
+fn decompressed(scene: &Scene) -> Result<Branch, Box<dyn Error>> {
     let mut run = Relaxation::new(scene)?;
     let mut states = Vec::new();
     loop {

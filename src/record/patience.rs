@@ -1,7 +1,7 @@
 //! How long what was recorded may wait, in moves of a particle: the same in every run, and a time all the same.
 
 use super::Header;
-use crate::scene::Channels;
+use crate::scene::{Channels, Schedule};
 
 /// When what was gathered has waited long enough. A move of a particle takes some 100 ns.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,9 @@ impl Patience {
     pub fn ends(&self, first: u64, last: u64) -> bool {
         let schedules = self.channels.named();
         let next = schedules.iter().filter_map(|(_, s)| s.after(last)).min();
+        // When the next relaxed state of a protocol comes is not known; that some come is.
+        let relaxed = schedules.iter().any(|(_, s)| *s == Schedule::Relaxed);
+        let next = next.or(relaxed.then_some(last));
         // Without a schedule nothing more is sure to come.
         next.is_none_or(|next| {
             next.saturating_sub(first).saturating_mul(self.particles) >= self.moves
@@ -35,7 +38,6 @@ impl Patience {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Schedule;
 
     #[test]
     fn what_waits_is_bounded_by_the_moves_until_the_next_snapshot() {
@@ -57,5 +59,7 @@ mod tests {
         assert!(patience(Schedule::Every(50), off).ends(50, 50));
         assert!(!patience(Schedule::Every(50), Schedule::Every(1)).ends(50, 50));
         assert!(patience(off, off).ends(7, 7));
+        let relaxed = patience(Schedule::Relaxed, off);
+        assert!(!relaxed.ends(700, 709) && relaxed.ends(700, 710));
     }
 }

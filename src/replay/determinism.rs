@@ -248,6 +248,7 @@ pub(super) fn each_segment(
                 from: last.replace(state.frame.clone()),
                 to: state.frame,
                 packing: state.packing,
+                domain: recording.domain(),
                 legs: if first {
                     recording.legs().to_vec()
                 } else {

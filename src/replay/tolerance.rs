@@ -18,7 +18,7 @@ impl Segment {
     /// The run at the beginning of the segment, from what is recorded there.
     pub fn run_from_recorded(&self, scene: &Scene) -> Result<Relaxation, RelaxError> {
         match &self.from {
-            Some(from) => Relaxation::resume(scene, self.packing.clone(), from.clone()),
+            Some(from) => Relaxation::resume(scene, self.packing_of(from), from.clone()),
             None if self.to.step == 0 => Relaxation::of_packing(scene, self.packing.clone()),
             None => Relaxation::resume(scene, self.packing.clone(), self.to.clone()),
         }
@@ -29,18 +29,16 @@ impl Segment {
         let begin = self.from.as_ref().unwrap_or(&self.to);
         let steps = (self.to.step - begin.step).max(1);
         let ratio = self.packing.largest_radius() / self.packing.smallest_radius();
-        let promised =
-            promised(scene, &self.packing, begin).max(promised(scene, &self.packing, &self.to));
+        let promised = |frame| promised(scene, &self.packing_of(frame), frame);
+        let promised = promised(begin).max(promised(&self.to));
         (AMPLIFIED * ratio * promised).max(ALLOWED) * steps as f64
     }
 }
 
 /// The residual of the contact law that a frame promises at its own `f_max`.
 fn promised(scene: &Scene, packing: &Packing, frame: &Frame) -> f64 {
-    let mut packing = packing.clone();
-    frame.positions.clone_into(packing.positions_mut());
     let scene = scene.stage(frame.stage);
-    scene.model().promise(&packing, frame, scene.threshold)
+    scene.model().promise(packing, frame, scene.threshold)
 }
 
 /// How far two frames of one step are apart: positions by the mean radius, forces by the largest.

@@ -2,6 +2,7 @@
 
 use super::Metrics;
 use super::difference::{self, Difference, What};
+use crate::domain::Domain;
 use crate::protocol::{RelaxError, Relaxation, Status};
 use crate::record::{Leg, Outcome, Snapshot, Snapshots};
 use crate::scene::{Scene, Schedule};
@@ -16,6 +17,8 @@ pub(super) struct Segment {
     /// The state at its end, and the packing at it.
     pub to: Frame,
     pub packing: Packing,
+    /// The box of frames that have none of their own.
+    pub domain: Domain,
     /// What the run went by before the first; empty for the others.
     pub legs: Vec<Leg>,
     /// Metrics that the file has on the way, and late ones.
@@ -37,9 +40,17 @@ impl Segment {
     /// The run at the beginning of the segment, or how the recorded radii and box differ from the scene's.
     pub fn run(&self, scene: &Scene) -> Result<Result<Relaxation, Difference>, RelaxError> {
         match &self.from {
-            Some(from) => Relaxation::resume(scene, self.packing.clone(), from.clone()).map(Ok),
+            Some(from) => Relaxation::resume(scene, self.packing_of(from), from.clone()).map(Ok),
             None => first_run(scene, &self.legs, &self.to, &self.packing),
         }
+    }
+
+    /// The packing at a frame of the segment.
+    pub fn packing_of(&self, frame: &Frame) -> Packing {
+        let mut packing = self.packing.clone();
+        packing.set_domain(frame.domain.unwrap_or(self.domain));
+        frame.positions.clone_into(packing.positions_mut());
+        packing
     }
 
     /// Advances `run` to the segment's end and hands on what is recorded on the way, until `emit` has had enough; the first
@@ -174,10 +185,12 @@ fn first_run(
         numbers
     };
     let (here, there) = (numbers(recorded), numbers(run.packing()));
-    let what = difference::numbers(&here, &there, |k| match k {
+    // A box that a protocol has changed is compared with the frame that has it.
+    let begin = if first.domain.is_some() { 2 } else { 0 };
+    let what = difference::numbers(&here[begin..], &there[begin..], |k| match k + begin {
         0 => "L_x of the box".to_owned(),
         1 => "L_y of the box".to_owned(),
-        _ => format!("radius of particle {}", k - 2),
+        number => format!("radius of particle {}", number - 2),
     });
     if let Some(what) = what {
         return Ok(Err(Difference { step, what }));

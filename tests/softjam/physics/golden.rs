@@ -22,5 +22,5 @@ fn golden_scenes_give_the_golden_digests() {
         assert_eq!(found.as_str(), digest, "{name}");
         scenes += 1;
     }
-    assert_eq!(scenes, 6);
+    assert_eq!(scenes, 9);
 }
