@@ -351,8 +351,9 @@ fn a_run_goes_on_with_its_protocol_under_another_model() {
     };
     let packing = run.packing().clone();
     let run = Relaxation::take_over(&before, &after, packing, run.frame()).unwrap();
+    // The first stage begins with relaxing further, since it asks for more than the relaxation in front of it.
     let strains: Vec<f64> = states(run).iter().map(|state| state.strain).collect();
-    assert_eq!(strains, [0.01, 0.02, 0.01]);
+    assert_eq!(strains, [0.0, 0.01, 0.02, 0.01]);
 }
 
 /// The slope of the stress is found by central differences about a state whose contacts stay.
