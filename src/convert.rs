@@ -378,7 +378,7 @@ impl Conversion {
                 contacts,
                 state,
                 edge,
-                stage: of_protocol.and_then(|run| run.stage_end()),
+                stage: of_protocol.and_then(|run| run.stage_end()).map(Box::new),
             })?;
         }
         Ok(())

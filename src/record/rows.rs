@@ -100,7 +100,8 @@ impl Rows {
             self.pending.bytes += METRICS_BYTES;
         }
         let at = |end| (snapshot.step, nanoseconds, end);
-        self.pending.stages.extend(snapshot.stage.map(at));
+        let end = snapshot.stage.as_deref().copied();
+        self.pending.stages.extend(end.map(at));
         if let Some(frame) = &snapshot.frame {
             self.record_frame(snapshot, frame);
         }

@@ -41,7 +41,7 @@ pub struct Snapshot {
     /// picture is drawn.
     pub edge: bool,
     /// What a stage of a protocol has come to, whose last frame this is.
-    pub stage: Option<StageEnd>,
+    pub stage: Option<Box<StageEnd>>,
 }
 
 impl Snapshot {
@@ -83,7 +83,7 @@ impl Snapshot {
             contacts,
             state,
             edge,
-            stage: run.stage_end(),
+            stage: run.stage_end().map(Box::new),
         })
     }
 }

@@ -136,8 +136,12 @@ impl Waiting {
                 if snapshot.frame.is_none() || keep {
                     self.push(snapshot);
                 } else if snapshot.metrics.is_some() {
-                    let frame = None;
-                    self.push(Arc::new(Snapshot { frame, ..*snapshot }));
+                    let (frame, stage) = (None, snapshot.stage.clone());
+                    self.push(Arc::new(Snapshot {
+                        frame,
+                        stage,
+                        ..*snapshot
+                    }));
                 }
             }
         } else if snapshots.len() > 1 {
@@ -192,8 +196,8 @@ mod tests {
             Arc::new(Snapshot { step, ..snapshot })
         };
         let queue = Queue::new();
-        // Ten times what fits, a frame every fourth step.
-        let frames = 10 * LIMIT as u64 / size(&at(0, true)) as u64;
+        // Four times what fits, a frame every fourth step.
+        let frames = 4 * LIMIT as u64 / size(&at(0, true)) as u64;
         for step in 0..4 * frames {
             queue.push(at(step, step % 4 == 0));
             assert!(queue.waiting().bytes <= LIMIT);
@@ -236,6 +240,7 @@ mod tests {
             queue.push(Arc::new(Snapshot {
                 step,
                 frame: None,
+                stage: None,
                 ..*template
             }));
         }
