@@ -27,8 +27,8 @@ Examples:
   softjam figure run.rrd --color deformation --no-chains -o shapes.svg
   softjam figure foam.rrd --films --color nothing --no-chains -o films.svg      droplets that keep their area, and the films between
   softjam figure --fmax a.rrd b.rrd c.rrd -o fall.svg     f_max against step, a curve a run
-  softjam figure --stress-strain sheared.rrd -o stress.svg     of softjam record --shear 0.3
-  softjam figure --pressure-phi jam.rrd -o pressure.svg        of softjam record --jam, with its φ_J, or --compress-to 0.9
+  softjam figure --stress-strain sheared.rrd -o stress.svg     a shear: stress against strain, with its yield events
+  softjam figure --pressure-phi jam.rrd -o pressure.svg        a compression, or the search of φ_J
   softjam figure run.rrd --step 0 --disks --color nothing --no-chains -o figure5a.svg      the paper's figures 5(a)
   softjam figure run.rrd --color nothing --no-chains -o figure5b.svg                       and 5(b)
 
