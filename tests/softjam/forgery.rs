@@ -3,7 +3,6 @@
 
 use crate::common::Random;
 use crate::files::{FORMATS, open, recorder};
-use softjam::analysis::METRICS;
 use softjam::analysis::Stability;
 use softjam::domain::Vec2;
 use softjam::models::droplet::Form;
@@ -103,12 +102,12 @@ type Forge = fn(&mut Run, &mut Random);
 const METRIC: [(&str, Forge); 5] = [
     ("a value by its last bit", |run, random| {
         let k = random.below(run.snapshots.len());
-        // All but the last, the moment, which these droplets do not have.
-        let metric = random.below(METRICS.len() - 1);
         let metrics = run.snapshots[k]
             .metrics
             .as_mut()
             .expect("every step has them");
+        // The first ones are those that every run has.
+        let metric = random.below(metrics.iter().flatten().count());
         metrics[metric] = metrics[metric].map(f64::next_up);
     }),
     ("its time", |run, random| {
