@@ -23,7 +23,7 @@ pub struct Stage {
     pub steps: u64,
 }
 
-/// What a stage does.
+/// What a stage does. See the example of [`Stage`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Act {
     /// Nothing but relax, as far as the stage says.
