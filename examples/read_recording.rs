@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = arguments
         .next()
         .unwrap_or("recordings/jammed.rrd".to_owned());
-    let mut metrics: BTreeMap<u64, [f64; METRICS.len()]> = BTreeMap::new();
+    let mut metrics: BTreeMap<u64, [Option<f64>; METRICS.len()]> = BTreeMap::new();
     let mut states = Vec::new();
     for event in Recording::open(&path)? {
         match event? {
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let row = metrics.entry(step).or_default();
                 for (place, known) in METRICS.iter().enumerate() {
                     if *known == name {
-                        row[place] = value;
+                        row[place] = Some(value);
                     }
                 }
             }
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     writeln!(out, "\n    step  f_max")?;
     let every = metrics.len().div_ceil(12).max(1);
     for (step, row) in metrics.iter().step_by(every) {
-        writeln!(out, "{step:8}  {:.3e}", row[0])?;
+        writeln!(out, "{step:8}  {:.3e}", row[0].unwrap_or(f64::NAN))?;
     }
     let mut distribution = Curve {
         label: path,
@@ -88,6 +88,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (step, row) in &metrics {
             bits.write_all(&step.to_le_bytes())?;
             row.iter()
+                .flatten()
                 .try_for_each(|x| bits.write_all(&x.to_le_bytes()))?;
         }
         for frame in &states {

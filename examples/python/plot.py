@@ -8,7 +8,23 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-METRICS = ("f_max", "log10_f_max", "energy", "pressure", "coordination", "contacts", "rattlers", "dt", "stress_xy")
+# Those behind stress_xy are there in some runs.
+METRICS = (
+    "f_max",
+    "log10_f_max",
+    "energy",
+    "pressure",
+    "coordination",
+    "contacts",
+    "rattlers",
+    "dt",
+    "stress_xy",
+    "moment",
+    "phi",
+    "strain",
+    "stress_xx",
+    "stress_yy",
+)
 
 
 def plot(f_max, forces, path):
@@ -32,7 +48,8 @@ def write_bits(metrics, states, path):
     with open(path, "wb") as file:
         for step in sorted(metrics.get("f_max", ())):
             file.write(np.uint64(step).astype("<u8").tobytes())
-            file.write(np.array([metrics[name][step] for name in METRICS], dtype="<f8").tobytes())
+            row = [metrics[name][step] for name in METRICS if step in metrics.get(name, {})]
+            file.write(np.array(row, dtype="<f8").tobytes())
         for step in sorted(states):
             state = states[step]
             file.write(np.uint64(step).astype("<u8").tobytes())
